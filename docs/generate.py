@@ -50,10 +50,9 @@ EXAMPLES = {
     "SECONDS": "1.5",
     "AXIS=FACTOR": "all=0.99",
     "AXIS=TORQUE": "base_x=0.01",
-    "WHEEL": "2",
-    "THRUSTER": "3",
 }
-"""An argument as it may be given, by the form of the kind."""
+"""An argument as it may be given, by its form; of others it follows from what is allowed."""
+NAMED = {"AXIS": "base_x", "BASE_AXIS": "base_x", "JOINT": "3", "WHEEL": "2", "THRUSTER": "3"}
 
 FIELDS = {
     "/joint_states": "`name`: n actuated joints, then passive ones, whose `effort` is 0",
@@ -220,7 +219,9 @@ def _kind(kind: Kind) -> Sequence[str]:
     example = f"{kind.name}@2-3" if kind.lasts else f"{kind.name}@2"
     default = ""
     if kind.argument:
-        example += f":{EXAMPLES[kind.argument.form]}"
+        about = [NAMED[kind.argument.about.name]] if kind.argument.about else []
+        number = [f"{kind.argument.high / 100.0:g}"] if kind.argument.symbol else []
+        example += f":{EXAMPLES.get(kind.argument.form, '='.join([*about, *number]))}"
     if kind.default is not None:
         default = "for ever" if math.isinf(kind.default) else f"{kind.default:g}"
     unit = kind.argument.unit if kind.argument else ""

@@ -30,7 +30,7 @@ TURN = 100
 """Maximum number of messages taken of a topic before the next one has its turn."""
 REPORTS = 5
 """Maximum number of reports read in a round: each takes a tenth of a millisecond."""
-LOOK_PERIOD_S = 0.02
+CHECK_PERIOD_S = 0.02
 """Period of checks for publishers of topics that only some flights have."""
 AHEAD_OF_NEED = (topics.REFERENCE_JOINTS, topics.REFERENCE_BASE)
 """Topics sent ahead of need: messages that came during a pause belong to the time after it, too."""
@@ -57,13 +57,7 @@ class RecorderLoop:
     ) -> None:
         """Open the bag and subscribe to the topics that every flight has.
 
-        Args:
-            node: its node.
-            settings: its parameters.
-            gives_way: True to yield to other processes after each message.
-
-        Raises:
-            InputError: the flight is not JSON, or the bag cannot be created.
+        With ``gives_way`` it yields to other processes after each message.
         """
         self._node, self._settings, self._gives_way = node, settings, gives_way
         try:
@@ -80,7 +74,7 @@ class RecorderLoop:
         ]
         self._unsent = [topic for topic in topics.RECORDED if topic.is_optional]
         """Optional topics without publisher so far."""
-        self._look_at = 0.0
+        self._check_at = 0.0
         """Time of the next check for their publishers, monotonic clock."""
         self._recorder = BagRecorder(
             path,
@@ -136,7 +130,7 @@ class RecorderLoop:
             self._recorder.flush_if_due()
             if is_timely or self._recorder.is_behind:
                 last_arrival = time.monotonic()  # a round may last longer than the silence
-            elif not (busy or self._has_publishers()):
+            elif not (busy or any(map(self._node.count_publishers, self._names.values()))):
                 break
             if not busy:
                 time.sleep(self._settings.drain_period)
@@ -162,25 +156,23 @@ class RecorderLoop:
 
     def _subscribe_to_optional(self) -> None:
         # a plant that publishes them waits for this subscription
-        if (now := time.monotonic()) < self._look_at:
+        if (now := time.monotonic()) < self._check_at:
             return
-        self._look_at = now + LOOK_PERIOD_S
+        self._check_at = now + CHECK_PERIOD_S
         for topic in [t for t in self._unsent if self._node.count_publishers(self._names[t])]:
             self._unsent.remove(topic)
             self._inputs.append(self._listen_to(topic))
 
-    def _has_publishers(self) -> bool:
-        return any(map(self._node.count_publishers, self._names.values()))
-
     def _take_round(self) -> tuple[bool, bool]:
-        """Take some messages of each topic; return if any was timely, and if more wait."""
         is_timely = waiting = False  # in turns: a backlog of one topic must not delay the others
         for entry in self._inputs:
             taken, timely = self._take_some(entry)
             is_timely, waiting = is_timely or timely > 0, waiting or taken == TURN
         self._take_description()
         self._take_counts()
-        self._log_failure()
+        if self.failure and not self._is_failure_logged:
+            self._is_failure_logged = True
+            self._node.log(f"the bag is no longer written: {self.failure}; the flight goes on")
         return is_timely, waiting
 
     def _take_some(self, entry: RawSubscription) -> tuple[int, int]:
@@ -222,18 +214,9 @@ class RecorderLoop:
     def _end_ns(self) -> int:
         return NEVER_NS if self._until_ns is None else self._until_ns
 
-    def _log_failure(self) -> None:
-        if self.failure and not self._is_failure_logged:
-            self._is_failure_logged = True
-            self._node.log(f"the bag is no longer written: {self.failure}; the flight goes on")
-
 
 def set_aside(bag: Path) -> Path:
-    """Rename a bag that is closed to ``<bag>_before_reset_<number>``, the first free; return that.
-
-    Raises:
-        InputError: it cannot be renamed.
-    """
+    """Rename a closed bag to ``<bag>_before_reset_<number>``, the first free; return that."""
     names = (bag.with_name(f"{bag.name}_before_reset_{number}") for number in itertools.count(1))
     free = next(name for name in names if not name.exists())
     try:

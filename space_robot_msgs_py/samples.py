@@ -7,7 +7,7 @@ float64, allocated once by the owner and overwritten in place.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -21,14 +21,16 @@ from .signals import Each, Reporter, signal, signals_of
 
 Array = NDArray[np.float64]
 
-MOST_WHEELS, MOST_THRUSTERS, MOST_TORQUERS, MOST_PASSIVE, MOST_GEARS = 8, 24, 6, 24, 64
+MOST_WHEELS, MOST_THRUSTERS, MOST_TORQUERS, MOST_PASSIVE = 8, 24, 6, 24
 """The base has no more reaction wheels, thrusters and magnetic torquers, a robot no more passive
-joints and gears. Records have room for as many, so that their number is no part of the layout, and
-another number compiles nothing anew."""
+joints. Records have room for as many, so that their number is no part of the layout, and another
+number compiles nothing anew."""
+MOST_ACTUATORS = MOST_WHEELS + MOST_THRUSTERS + MOST_TORQUERS
+"""The base has no more of all that a command has a number for."""
 
 
 class RobotNames(NamedTuple):
-    """The names that a robot's numbers go by in messages."""
+    """Names of a robot's numbers in messages."""
 
     joints: tuple[str, ...]
     """Those with motors."""
@@ -39,33 +41,9 @@ class RobotNames(NamedTuple):
     geared: tuple[str, ...] = ()
     """Those of `joints` with a gear, whose motors move apart from them."""
     in_orbit: bool = False
-    """True for a robot with an orbit, whose state tells of it."""
+    """True for a robot in an orbit, whose state includes it."""
     torquers: tuple[str, ...] = ()
     """Magnetic torquers of the base."""
-
-    @classmethod
-    def of(
-        cls,
-        joints: Sequence[str],
-        actuators: Sequence[str] = (),
-        wheel_count: int = 0,
-        passive: Sequence[str] = (),
-        geared: Sequence[str] = (),
-        torquer_count: int = 0,
-    ) -> RobotNames:
-        """Take the joints' names and those of the base's ``actuators``.
-
-        These are wheels, then thrusters, then magnetic torquers.
-        """
-        behind = len(actuators) - torquer_count
-        return cls(
-            tuple(joints),
-            tuple(actuators[:wheel_count]),
-            tuple(actuators[wheel_count:behind]),
-            tuple(passive),
-            tuple(geared),
-            torquers=tuple(actuators[behind:]),
-        )
 
     @property
     def axes(self) -> tuple[str, ...]:
@@ -99,7 +77,7 @@ class RobotNames(NamedTuple):
 
 
 class Timebase(NamedTuple):
-    """Ticks to stamps and back, in integers: never a clock's difference."""
+    """Conversion of ticks and stamps, in integers."""
 
     period_ns: int
 
@@ -134,7 +112,7 @@ WHEELS = Each("wheels", lambda n: MOST_WHEELS)
 THRUSTERS = Each("thrusters", lambda n: MOST_THRUSTERS)
 PASSIVE = Each("passive", lambda n: MOST_PASSIVE)
 GEARED = Each("geared", lambda n: n)
-ACTUATORS = Each("actuators", lambda n: MOST_WHEELS + MOST_THRUSTERS + MOST_TORQUERS)
+ACTUATORS = Each("actuators", lambda n: MOST_ACTUATORS)
 INERTIAL, BASE = "inertial axes", "base axes"
 SOURCES = ("gravity_gradient", "drag", "sunlight", "magnetic")
 """Sources of the external torques of a state; magnetic is the torque of the base's residual dipole,
@@ -259,7 +237,7 @@ class CommandSignals:
 
 
 class TelemetrySignals:
-    """What a control law tells of itself."""
+    """Telemetry of a control law."""
 
     s: Array = signal(Reporter.OTHERS, AXES, "rad/s", "", "sliding variable").sent(
         topics.SIGNALS, "velocity"
@@ -284,7 +262,7 @@ STATE_FIELDS = (*SENSED_FIELDS, "applied_torque")
 
 
 class RobotState(StateSignals):
-    """What the plant measures at a tick, and what it applied over the interval just ended.
+    """Measurements at a tick, and what the plant applied over the interval that ended with it.
 
     Each signal of `StateSignals` is an attribute, a view of ``block``, which compiled code reads
     whole.
@@ -300,13 +278,13 @@ class RobotState(StateSignals):
 
     @classmethod
     def allocate(cls, n: int) -> RobotState:
-        """A state for ``n`` joints, at rest at the origin."""
+        """Return a state for ``n`` joints, at rest at the origin."""
         state = cls(0, State.block(n))
         state.quaternion[0] = 1.0
         return state
 
     def copy(self) -> RobotState:
-        """The same state in memory of its own."""
+        """Return the same state in memory of its own."""
         return RobotState(self.tick, self.block.copy())
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -350,14 +328,14 @@ class Reference(Record):
 
     @staticmethod
     def parts(references: Block) -> tuple[Array, Array]:
-        """Views (k, 3, n) and (k, 10) of the joints' and the base's part of k references."""
+        """Return views (k, 3, n) and (k, 10) of the joints' and the base's part of k references."""
         k, size = len(references), references.itemsize // 8
         numbers = references.view(np.float64).reshape(k, size)
         return numbers[:, :-10].reshape(k, 3, (size - 10) // 3), numbers[:, -10:]
 
     @classmethod
     def at_rest(cls, n: int) -> Block:
-        """A block of one that asks for rest at zero."""
+        """Return a block of one reference, at rest at zero."""
         block = cls.block(n)
         block[0].quaternion[0] = 1.0
         return block
@@ -412,6 +390,6 @@ class LawInForce(NamedTuple):
 
 
 def in_order(laws: Iterable[LawInForce]) -> tuple[LawInForce, ...]:
-    """Laws by rising tick; of several of one tick the last, under which it was answered."""
+    """Return the laws by rising tick; of several at one tick the last, which answered it."""
     last_of_tick = {law.tick: law for law in laws}
     return tuple(law for _, law in sorted(last_of_tick.items()))

@@ -1,4 +1,4 @@
-"""What is declared of a quantity of a flight: all else follows from the declaration.
+"""Declaration of a measured, commanded or desired quantity; all else follows from it.
 
 `space_robot_msgs_py.samples` has the table of all signals. From it follow the records of kernels,
 the columns of a log, the content of messages, what is read from bags, and the reference of topics.

@@ -11,11 +11,7 @@ LATEST_S = 1e9
 
 
 def check_time(seconds: float, name: str = "T") -> None:
-    """Check that a time can be that of something that happens in a flight.
-
-    Raises:
-        InputError: it is negative, or later than any flight lasts.
-    """
+    """Check that a time can be that of something that happens in a flight."""
     if not 0.0 <= seconds <= LATEST_S:
         raise InputError(f"{name} must be from 0 to {LATEST_S:g} s, got {seconds:g}")
 

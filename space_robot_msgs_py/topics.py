@@ -86,7 +86,7 @@ def _state(name: str, kind: str, of: str, frame: str = "", **flags: Any) -> Topi
 
 JOINT_STATES = _state("joint_states", _JOINTS, "all_joints", is_controlling=True)
 BASE_STATE = _state("base/state", _BODY, "body", INERTIAL_FRAME, is_controlling=True)
-# What the base's actuators tell of themselves; sent where there are any.
+# Measurements of the base's actuators; sent if there are any.
 WHEELS_STATE = _state(
     "wheels/state", _JOINTS, "wheels", BASE_FRAME, is_optional=True, is_controlling=True
 )
@@ -103,21 +103,21 @@ MAGNETOMETER = _state(
     is_controlling=True,
 )
 COMMAND = _state("command", _JOINTS, "commanded", BASE_FRAME)
-# Reference and clock are not transient local: a late joiner would receive the past, and that a
-# message was lost if one is pushed out meanwhile; at depth 1 a slow one would lose some. The
-# mission says again what is still needed when somebody joins, a plant that waits its time.
+# Reference and clock are not transient local: a late joiner would receive old messages, and a
+# report of lost ones if the queue overflows meanwhile; at depth 1 a slow one would lose some. The
+# mission repeats what is still needed when a subscriber joins, a waiting plant its time.
 REFERENCE_JOINTS = Topic("reference/joints", _JOINT_POINTS, 200, of="joints")
 REFERENCE_BASE = Topic("reference/base", _BODY_POINTS, 200, frame=INERTIAL_FRAME, of="body")
 TELEMETRY = Topic(
     "controller/telemetry", "std_msgs/msg/Float64MultiArray", 1_000, has_stamp=False, of="axes"
 )
-# The telemetry once more, by name: what viewers plot; nobody here reads it.
+# Telemetry by names of axes, for plotting tools; no node here subscribes.
 SIGNALS = Topic("controller/signals", _JOINTS, 1_000, is_optional=True, frame=BASE_FRAME, of="axes")
 LAW = Topic(
     "controller/law", "rcl_interfaces/msg/ParameterEvent", 100, transient_local=True, is_event=True
 )
 CLOCK = Topic("clock", "rosgraph_msgs/msg/Clock", 1_000)
-# The truth is sent where what the sensors tell may differ from it; no flight software listens.
+# True states are sent if sensors or actuators have errors; no flight software subscribes.
 TRUTH_JOINTS = Topic("truth/joints", _JOINT_POINTS, 1_000, is_optional=True, of="all_axes")
 TRUTH_BASE = Topic(
     "truth/base", _BODY_POINTS, 1_000, is_optional=True, frame=INERTIAL_FRAME, of="body"
@@ -156,28 +156,27 @@ ALL = (
     *(part for part in STATES if part not in (JOINT_STATES, BASE_STATE)),
     TRUTH_ORBIT,
 )
-"""All that tell of a flight: who reads a bag reads these."""
+"""Topics that a flight log is made from."""
 SCENE = (TRANSFORMS, TRANSFORMS_STATIC, ROBOT_DESCRIPTION)
-"""What viewers show of it; nobody here reads them again."""
+"""Topics for viewers only; they are not read from bags."""
 RECORDED = (*ALL, SIGNALS, *SCENE)
-"""All that the recorder listens to."""
+"""Topics that the recorder subscribes to."""
 TRUTH = (TRUTH_JOINTS, TRUTH_BASE)
 BY_NAME = {topic.full_name: topic for topic in ALL}
 """By their full names in the root namespace."""
 # Shapes in the inertial frame, for viewers, while one listens; bags have transforms instead.
 MARKERS = Topic("markers", "visualization_msgs/msg/MarkerArray", 10, is_optional=True)
-# The base once more, in standard messages of one frame each, for others' nodes: while one listens.
+# The base in standard messages of one frame each, for other nodes; sent while one subscribes.
 ODOMETRY = Topic("base/odometry", "nav_msgs/msg/Odometry", 100, is_optional=True)
 IMU = Topic("base/imu", "sensor_msgs/msg/Imu", 100, is_optional=True)
 WRENCH = Topic("base/wrench", "geometry_msgs/msg/WrenchStamped", 100, is_optional=True)
 STANDARD = (ODOMETRY, IMU, WRENCH)
 JOINT_TRAJECTORY = Topic("joint_trajectory", _JOINT_POINTS, 10, is_event=True)
-"""Trajectories that others, as MoveIt, ask the mission to follow; the reference tells what came of
-it."""
-# One for all robots of a domain, as ROS has it: each status tells its node's name.
+"""Trajectories that other nodes, such as MoveIt, send to the mission."""
+# One topic for all robots of a domain, as usual in ROS: each status has its node's name.
 DIAGNOSTICS = Topic("/diagnostics", "diagnostic_msgs/msg/DiagnosticArray", 100)
 SIMULATION_PAUSED = _LATCHED._replace(name="simulation/paused", type="std_msgs/msg/Bool")
-"""True while the plant is held: not recorded, for a bag tells nothing of the wall clock's time."""
+"""True while the simulation is paused; not recorded, since bags are in simulated time."""
 PLANT_DESCRIPTION = _LATCHED._replace(name="_plant_description")
 """Description of the plant as JSON, which the recorder stores in the bag."""
 ROSOUT = Topic("/rosout", "rcl_interfaces/msg/Log", 1_000, transient_local=True)
@@ -192,4 +191,4 @@ FOR_OTHERS = (
     SIMULATION_PAUSED,
     ROSOUT,
 )
-"""What the recorder leaves out and `ros2 bag record` hears."""
+"""Topics that `ros2 bag record` records and our recorder does not."""

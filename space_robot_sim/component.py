@@ -26,7 +26,7 @@ Array = NDArray[np.float64]
 
 
 class Installation(NamedTuple):
-    """What a component's numbers depend on beside its data sheet."""
+    """Numbers of the plant on which a component's depend, beside its data sheet."""
 
     n: int
     """Joints with motors."""
@@ -53,11 +53,7 @@ class Component(Record):
 
     @classmethod
     def build(cls, sheet: Any, at: Installation) -> Self:
-        """Return a record with the numbers of a data sheet.
-
-        Raises:
-            InputError: the numbers do not fit one another, or the robot, or the period.
-        """
+        """Return a record with the numbers of a data sheet."""
         component = cls.allocate(at.n)
         cls._fill(component, sheet, at)
         return component
@@ -73,13 +69,13 @@ class Component(Record):
                 if issubclass(field, Component):
                     field._fill(record[name], part, at)
                 continue
-            if field.source is None:
+            if field.source is None:  # state and scratch begin at zero
                 continue
             if isinstance(field.source, str):
                 value = attrgetter(field.source)(sheet)
             else:
                 value = field.source(sheet, at)
-            if np.ndim(value):  # what there is room for beyond the last one stays zero
+            if np.ndim(value):  # entries beyond the last one stay zero
                 record[name][: len(value)] = value
             else:
                 record[name] = value
@@ -131,6 +127,7 @@ class TemporaryChange:
         values = record[self._field]
         if not self._acting:
             self._sound = values.copy()
+        # from the sound numbers each time: an inverse of each change would leave rounding errors
         values[:] = self._sound
         for fault in acting:
             places = _places(fault, record)
@@ -145,7 +142,7 @@ def _places(fault: ScheduledFault, record: Any) -> Any:
     if about is None and not kind.group:
         return slice(None)
     axes = np.array(fault.axes, np.intp)
-    if about is About.JOINT:
+    if about is About.JOINT:  # a schedule counts the base's axes first
         axes -= len(BASE_AXES)
     return record[kind.rows][axes].astype(np.intp) if kind.rows else axes
 
@@ -163,17 +160,17 @@ class ComponentFaults:
             if (faults := schedule.of(*(k.name for k in component.FAULTS if k.field == field)))
         ]
         acting = schedule.of(*(kind.name for kind in kinds_of(record)))
-        self._turns = sorted({tick for fault in acting for tick in (fault.first, fault.stop)})
+        self._limits = sorted({tick for fault in acting for tick in (fault.first, fault.stop)})
         """Ticks at which a fault begins or ends."""
 
     def apply(self, tick: int, record: Any) -> float:
         """Apply the faults to the components' records from ``tick`` on.
 
         Returns:
-            The next tick at which that changes (inf: it does not).
+            The next tick at which that changes (inf: it does not): up to there compiled code flies.
         """
         for path, component, change in self._changes:
             part = attrgetter(path)(record)
             if change.apply(tick, part):
                 component.refresh(part)
-        return next((turn for turn in self._turns if turn > tick), math.inf)
+        return next((limit for limit in self._limits if limit > tick), math.inf)

@@ -17,7 +17,7 @@ from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot.flight.simulate import simulate
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.bag.flight_log import REFERENCE, FlightLog
-from space_robot_msgs_py.bag.folder import read_information
+from space_robot_msgs_py.bag.folder import open_bag, read_information
 from space_robot_msgs_py.bag.message_accounting import noted_accounts
 from space_robot_msgs_py.bag.reader import read_flight
 from space_robot_msgs_py.bag.recorder import FLIGHT_KEY, BagRecorder
@@ -65,6 +65,14 @@ def messages_of(bag: Path) -> Iterator[tuple[topics.Topic, bytes]]:
     with mcap_file(bag).open("rb") as file:
         for _, channel, message in make_reader(file).iter_messages(log_time_order=False):
             yield as_sent(channel.topic, message.data)
+
+
+def messages_in(bag: Path, *wanted: topics.Topic) -> Iterator[tuple[str, bytes]]:
+    """Names and bytes of the messages of some topics (by default of all), as we read them."""
+    names = {topic.full_name for topic in wanted or topics.ALL}
+    for batch in open_bag(bag).batches():
+        if batch.topic in names:
+            yield from ((batch.topic, batch.message(i)) for i in range(len(batch)))
 
 
 def as_sent(name: str, data: bytes) -> tuple[topics.Topic, bytes]:

@@ -55,12 +55,13 @@ class ActuatorBench:
 
     def __init__(self, *faults: str, period: float = PERIOD, **settings: Any) -> None:
         self.settings = ActuatorSettings.model_validate(settings)
-        names = RobotNames.of(NAMES.joints, self.settings.names, self.settings.wheel_count)
-        schedule = Schedule(parse_faults(faults, PLANT_KINDS), 0, period, names)
+        names, wheels = self.settings.names, self.settings.wheel_count
+        robot = RobotNames(NAMES.joints, names[:wheels], names[wheels:])
+        schedule = Schedule(parse_faults(faults, PLANT_KINDS), 0, period, robot)
         self.block = Actuators.block(N)
         self.block[0] = Actuators.build(self.settings, Installation(N, period))
         self.faults = ComponentFaults(schedule, Actuators)
-        self.ring = command_delay_buffer(self.record, len(names.commanded))
+        self.ring = command_delay_buffer(self.record, len(robot.commanded))
         self.truth, self.measured = RobotState.allocate(N), RobotState.allocate(N)
         self.tick, self.period = 0, period
 

@@ -20,7 +20,7 @@ from space_robot_model.robot.parts import Gear
 from space_robot_msgs_py.samples import Command, RobotState
 from space_robot_sim.component import Installation
 from space_robot_sim.environment.friction import Friction, FrictionSettings
-from space_robot_sim.environment.neighbouring_orbit import meet
+from space_robot_sim.environment.neighbouring_orbit import target_state
 from space_robot_sim.environment.orbit import OrbitSettings
 from space_robot_sim.environment.target import Target
 from space_robot_sim.plant.mounting import mount_gears
@@ -230,7 +230,7 @@ def meeting_target(orbit: OrbitSettings, time: float, place: ArrayLike, **motion
 
     def miss(start: Array) -> Array:
         target = target_of(**{**motion, "position": start.tolist()})
-        return meet(target, orbit, time).position - np.asarray(place)
+        return target_state(target, orbit, time).position - np.asarray(place)
 
     for _ in range(3):
         now = miss(position)

@@ -174,7 +174,7 @@ def captures_of(log: FlightLog) -> Captures:
         )
     captures = Captures(events_of(log), robot, log.timebase.period, settings)
     for exchange in captures.exchanges:
-        if exchange.meeting and exchange.tick < log.first_tick:
+        if exchange.target_state and exchange.tick < log.first_tick:
             raise NotDescribedError(
                 f"whether {exchange.event.label} reached its target was before the first tick that "
                 "is analyzed"

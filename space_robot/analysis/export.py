@@ -36,6 +36,8 @@ BATCH = 16_384
 XYZ, WXYZ = "xyz", "wxyz"
 NAMED_ABOVE = (*STATE_FIELDS, *PASSIVE_FIELDS, "wheel_velocities", "wheel_torques", "thrusts")
 """Signals with names of their own; those of others follow from their declaration."""
+JOINT_NAMES = {"joints": "joint_names", "passive": "passive_names", "geared": "geared_names"}
+"""Attribute of a log with the names of what has a number each."""
 METADATA_KEY = b"space_robot"
 """The key of the flight's description, as JSON, in the metadata of a Parquet file's schema."""
 
@@ -185,13 +187,13 @@ def _columns(log: FlightLog) -> Iterator[tuple[list[str], Array]]:
         values = getattr(log, name)
         if name not in NAMED_ABOVE and values.shape[1]:
             unit = re.sub(r"\W", "_", declared.unit).lower()
-            yield _further(name, declared, log.geared_names, unit), values
+            yield _further(name, declared, log, unit), values
 
 
-def _further(name: str, declared: Signal, geared: Sequence[str], unit: str) -> list[str]:
+def _further(name: str, declared: Signal, log: FlightLog, unit: str) -> list[str]:
     """Return names of the columns of a signal that only some robots have."""
     if isinstance(declared.size, Each):
-        return _each(name, geared, unit)
+        return _each(name, getattr(log, JOINT_NAMES[declared.size.names]), unit)
     if declared.size in (1, 3):
         return _each(name, XYZ if declared.size == 3 else [""], unit)
     return _each("", declared.labels, unit)

@@ -13,12 +13,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from space_robot_model.elementary.matrices import product
-from space_robot_model.hardware.base_actuators import BaseActuatorSettings
-from space_robot_model.hardware.capability import ThrusterTorques, carried_momentum, wheel_loads
-from space_robot_model.hardware.thrusters import ThrusterSettings
-from space_robot_model.hardware.wheels import WheelSettings
+from space_robot_model.hardware.base_actuators import (
+    BaseActuatorSettings,
+    ThrusterSettings,
+    WheelSettings,
+)
 from space_robot_msgs_py.bag.flight_log import FlightLog
 
+from ..flight.capability import ThrusterTorques, carried_momentum, wheel_loads
 from .actuation import ROUNDING, wheel_motion
 from .external_torques import axes_of
 

@@ -14,10 +14,10 @@ from space_robot_control.allocation.settings import assumed_actuators
 from space_robot_control.guidance.courses import Piece
 from space_robot_control.guidance.demand import MotionDemand
 from space_robot_control.guidance.mission import Mission
-from space_robot_control.guidance.tool_paths import ToolFollower
 from space_robot_model.elementary.matrices import norms
 from space_robot_model.hardware.base_actuators import BaseActuatorSettings
 from space_robot_model.robot import Robot
+from space_robot_model.robot.kinematics import tool_state
 from space_robot_msgs_py.config.installation import config_directory
 from space_robot_msgs_py.errors import InputError
 from space_robot_sim.environment.orbit import OrbitSettings
@@ -86,20 +86,20 @@ def planned_segments(
     """
     if not mission.duration:
         raise InputError("the mission has no motion to plan: no segments")
-    follower = ToolFollower(robot.nominal, None)
+    nominal = robot.nominal
     demands = mission_demand(robot, mission.pieces, orbit or OrbitSettings(), start_rate)
-    return [_planned(asked, follower) for asked in demands]
+    return [_planned(asked, nominal) for asked in demands]
 
 
-def _planned(of_piece: PieceDemand, follower: ToolFollower) -> PlannedSegment:
+def _planned(of_piece: PieceDemand, robot: Robot) -> PlannedSegment:
     asked = of_piece.asked
     rows = np.unique(np.linspace(0, len(asked.time) - 1, POSTURES).astype(int))
-    poses = [follower.pose(asked.base[k, :4], asked.joints[k, 0]) for k in rows]
+    tools = [tool_state(robot, asked.base[k, :4], asked.joints[k, 0]) for k in rows]
     smallest = [
-        min(_smallest(pose.jacobian, pose.from_base) for pose in poses),
-        min(_smallest(pose.free_jacobian, pose.from_base) for pose in poses),
+        min(_smallest(tool.held, tool.position + tool.centre_of_mass) for tool in tools),
+        min(_smallest(tool.free, tool.position + tool.centre_of_mass) for tool in tools),
     ]
-    return PlannedSegment(*of_piece, np.array([pose.position for pose in poses]), *smallest)
+    return PlannedSegment(*of_piece, np.array([tool.position for tool in tools]), *smallest)
 
 
 def _smallest(jacobian: Array, lever: Array) -> float:

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from space_robot_model.elementary.matrices import norm, norms, product, unit_rows
-from space_robot_model.hardware.wheels import WheelSettings
+from space_robot_model.hardware.base_actuators import WheelSettings
 from space_robot_model.robot import Robot
 from space_robot_model.robot.gears import motor_momentum
 from space_robot_model.robot.momentum import Motion, robot_momentum
@@ -318,5 +318,5 @@ def missed_captures(flight: AnalysedLog) -> dict[str, float]:
     return {
         f"missed.{exchange.event.label}": captures.misses[exchange.tick]
         for exchange in captures.exchanges
-        if exchange.tick in captures.misses and exchange.meeting
+        if exchange.tick in captures.misses and exchange.target_state
     }

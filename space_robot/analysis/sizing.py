@@ -15,12 +15,12 @@ from numpy.typing import NDArray
 
 from space_robot_model.elementary.matrices import product
 from space_robot_model.hardware.base_actuators import BaseActuatorSettings
-from space_robot_model.hardware.capability import largest_momentum, largest_torque
 from space_robot_model.robot.placements import to_base, to_inertial
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.topics import BASE_AXES
 
+from ..flight.capability import largest_momentum, largest_torque
 from .analysed_log import AnalysedLog
 from .described import actuators_of
 from .external_torques import axes_of

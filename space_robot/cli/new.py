@@ -16,7 +16,7 @@ from .completed_names import names_in
 from .options import BASE, REPAIR, flight_options
 
 if TYPE_CHECKING:
-    from space_robot_model.robot.urdf_mount import Mount
+    from space_robot_model.robot.urdf import Mount
 
 SECTION = "Robots, missions and own pieces"
 
@@ -90,7 +90,7 @@ def _mount(
 ) -> Mount | None:
     """Return the satellite of an arm; None: the robot has one."""
     from space_robot_model.robot.inertia import check_inertia
-    from space_robot_model.robot.urdf_mount import Mount
+    from space_robot_model.robot.urdf import Mount
 
     if on and (mass is not None or inertia):
         raise click.UsageError("a satellite is --on a URDF, or has --base-mass and --base-inertia")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from pathlib import Path
 
 import click
@@ -46,7 +47,7 @@ def robot(robot: str, base: str | None, repair: bool, out: Path | None, as_json:
     findings = read_urdf(file, base, repair=True).findings if is_urdf else ()
     if findings and not repair:
         if as_json:
-            echo_json({"file": str(file), "defects": [finding.told for finding in findings]})
+            echo_json({"file": str(file), "defects": [asdict(finding) for finding in findings]})
         else:
             print_defects(findings, terminal())
         these = "a defect" if len(findings) == 1 else f"{len(findings)} defects"
@@ -59,6 +60,6 @@ def robot(robot: str, base: str | None, repair: bool, out: Path | None, as_json:
     # the URDF's own names of links
     description = describe(Robot.from_urdf(file, base, repair) if is_urdf else source.robot)
     if as_json:
-        echo_json({"file": str(file), **description, "defects": [f.told for f in findings]})
+        echo_json({"file": str(file), **description, "defects": [asdict(f) for f in findings]})
     else:
         print_robot(description, findings, terminal())

@@ -7,7 +7,7 @@ import shutil
 import subprocess
 from collections.abc import Iterator
 
-from space_robot_control.flight_code.library import COMPILERS
+from space_robot_control.flight_code.instances import COMPILERS
 
 from ..export.verify import CROSS, EMULATORS
 from .checked_item import CheckedItem

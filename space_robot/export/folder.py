@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 
 from space_robot_control.flight_code.folder import Exported
-from space_robot_control.flight_code.library import write_sources
+from space_robot_control.flight_code.instances import write_sources
 from space_robot_msgs_py.errors import InputError
 
 from ..console.files import whole_folder
@@ -57,7 +57,7 @@ def write_folder(
         written = []
         for flight in flights:
             flight.recording.write(acceptance / f"{flight.name}.bin")
-            written.append((flight.name, flight.about, len(flight.recording)))
+            written.append((flight.name, flight.about, len(flight.recording.records)))
             advance()
         for file in BUILD_FILES:
             (new / file).write_text(exported.render(file), encoding="utf-8")

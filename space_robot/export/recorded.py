@@ -11,15 +11,13 @@ from numpy.typing import NDArray
 from space_robot_control.controller.law_choice import LawChoice
 from space_robot_control.controller.tick import NEW
 from space_robot_control.flight_code.acceptance import (
-    CHOOSE,
     REFERENCE_SHARE,
     SHARE,
-    AnswerRecording,
     RecordingSupervisor,
+    corrupt_state,
+    corrupted_reference,
+    disturb_state,
     hostile_ticks,
-    shake,
-    spoil,
-    spoiled_reference,
 )
 from space_robot_control.flight_code.folder import Exported
 from space_robot_msgs_py.errors import FlightError
@@ -56,7 +54,7 @@ class RecordedFlight(NamedTuple):
     name: str
     about: str
     """What it is, in a line."""
-    recording: AnswerRecording
+    recording: RecordingSupervisor
 
 
 def recorded_flights(
@@ -94,18 +92,19 @@ def _of_hardware(flight: Flight) -> list[str]:
     return [*faults, *(f"thruster_stuck_off@0.2:{name}" for name in names.thrusters[:1])]
 
 
-def _supervisor(flight: Flight, recording: AnswerRecording) -> RecordingSupervisor:
+def _supervisor(flight: Flight, exported: Exported) -> RecordingSupervisor:
     settings = flight.controller_settings
     return RecordingSupervisor(
-        flight.controller, recording, settings.hold_ticks, settings.longest_jump
+        flight.controller, exported, settings.hold_ticks, settings.longest_jump
     )
 
 
-def _flown(flight: Flight, exported: Exported, place: int = 0, law: str = "") -> AnswerRecording:
-    recording = AnswerRecording(exported)
-    supervisor = _supervisor(flight, recording)
+def _flown(
+    flight: Flight, exported: Exported, place: int = 0, law: str = ""
+) -> RecordingSupervisor:
+    supervisor = _supervisor(flight, exported)
     if place:
-        recording.add(CHOOSE, place, supervisor, 0)
+        supervisor.choose(place)
         flight.law = flight.controller.law = flight.laws[law]
     nothing: Callable[..., None] = lambda *_: None  # noqa: E731
     loop = MessageLoop(flight, nothing, nothing, supervisor)
@@ -115,17 +114,17 @@ def _flown(flight: Flight, exported: Exported, place: int = 0, law: str = "") ->
     except FlightError:  # whatever was flown up to here counts
         pass
     supervisor.finish()
-    return recording
+    return supervisor
 
 
-def _hostile(plan: FlightPlan, exported: Exported, laws: Sequence[str]) -> AnswerRecording:
+def _hostile(plan: FlightPlan, exported: Exported, laws: Sequence[str]) -> RecordingSupervisor:
     """Record the answers to hostile states and references, between noisy ones of a still base.
 
     The first reference is none, so that there is nothing to hold.
     """
     flight = Flight(resolve(plan))
-    recording, random = AnswerRecording(exported), np.random.default_rng(20)
-    supervisor, wheels = _supervisor(flight, recording), _Wheels(flight)
+    random = np.random.default_rng(20)
+    supervisor, wheels = _supervisor(flight, exported), _Wheels(flight)
     choice = LawChoice(flight.law, flight.swaps)
     references = flight.mission.chunk(0, HOSTILE_TICKS).references()
     commanded = np.zeros(len(flight.plant.names.commanded))
@@ -134,7 +133,7 @@ def _hostile(plan: FlightPlan, exported: Exported, laws: Sequence[str]) -> Answe
             place = int(random.integers(len(laws)))
             choice.choose(flight.laws[laws[place]])
             supervisor.use(choice.chosen)
-            recording.add(CHOOSE, place, supervisor, 0)
+            supervisor.choose(place)
         if random.random() < REPEATED:  # one that is not answered at once
             supervisor.judge_stamp(tick)
         if supervisor.judge_stamp(tick) != NEW:
@@ -144,18 +143,18 @@ def _hostile(plan: FlightPlan, exported: Exported, laws: Sequence[str]) -> Answe
         state = flight.plant.state.copy()
         state.tick = tick
         noise = 0.0 if random.random() < REPEATED else 10.0 ** random.uniform(-6, -1)
-        shake(state, noise, random)
+        disturb_state(state, noise, random)
         wheels.measure(state, commanded, k)
         is_hostile = random.random() < SHARE and k % PHASE > QUIET_TICKS
         reference = references[k : k + 1]
-        spoil(state, wheels.count, random, reference["quaternion"][0], is_hostile)
+        corrupt_state(state, wheels.count, random, reference["quaternion"][0], is_hostile)
         if supervisor.answered < 0:
             reference = np.full_like(reference.view(np.float64), np.nan).view(reference.dtype)
         elif random.random() < REFERENCE_SHARE:
-            reference = spoiled_reference(reference, random)
+            reference = corrupted_reference(reference, random)
         commanded = supervisor.answer(state, reference).torque
     supervisor.finish()
-    return recording
+    return supervisor
 
 
 class _Wheels:

@@ -36,7 +36,7 @@ def export(flight: Flight, further: Sequence[str] = ()) -> Exported:
     robot = f"the robot {scenario.robots.controller.name!r}, as the controller knows it"
     sources = {law.name: f"gain set {settings.gains!r}, law {law.name}" for law in laws}
     limits = settings.hold_ticks, settings.longest_jump
-    software = FlightSoftware.of(
+    software = FlightSoftware(
         flight.controller,
         laws,
         flight.swaps,

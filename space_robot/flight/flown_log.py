@@ -102,7 +102,7 @@ def columns_of(
     log.commanded_torque = new(log.applied_torque.shape)
     log.telemetry = new((ticks, 4, log.axes))
     if not flight.plant.measures_truth:
-        log.record_measured(new, bool(flight.plant.names.torquers))
+        log.record_measured(new, flight.plant.names)
     return log
 
 

@@ -18,7 +18,7 @@ from space_robot_msgs_py.errors import MessageError
 from space_robot_msgs_py.samples import RobotState
 from space_robot_msgs_py.wire.codecs import CommandCodec, StateCodec
 from space_robot_msgs_py.wire.stamp_guard import AGREEING
-from space_robot_sim.plant.messages import NONE, CommandGuard, PlantMessages, SentState
+from space_robot_sim.plant.messages import NO_TICK, CommandGuard, PlantMessages, SentState
 
 from .plan import Flight
 
@@ -89,12 +89,12 @@ class MessageLoop:
 
     def _deliver(self, sent: SentState, tick: int) -> None:
         """Let the controller have a state; one whose answer is awaited comes until it is there."""
-        for _ in range(1 if sent.answered_by == NONE else AGREEING):
+        for _ in range(1 if sent.answered_by == NO_TICK else AGREEING):
             if self._answer(sent, tick) == sent.answered_by:
                 return
 
     def _answer(self, sent: SentState, tick: int) -> int:
-        """Let the controller answer a state, once; the tick that is answered, `NONE` if none is.
+        """Let the controller answer a state, once; the tick that is answered, `NO_TICK` if none is.
 
         An answer that is asked for again is left out: the next one overtakes it, or is lost
         with it.
@@ -104,12 +104,12 @@ class MessageLoop:
             parts = zip(self._states.topics, sent.messages, strict=True)
             stamp, *_ = [self._states.decode(topic, data, state) for topic, data in parts]
         except MessageError:
-            return NONE
+            return NO_TICK
         if self._answering.judge_stamp(stamp) != NEW:
-            return NONE
+            return NO_TICK
         reference = references.at(stamp) if references.covers(stamp) else references.hold(stamp)
         if reference is None:
-            return NONE
+            return NO_TICK
         for topic, message in self._answering.messages(stamp, state, reference):
             self._record(topic, message)
             if topic is topics.COMMAND:

@@ -18,7 +18,6 @@ from space_robot_control.guidance.demand import MotionDemand, demand
 from space_robot_control.guidance.segments import Segment, ToolSegment, read_segments
 from space_robot_model.elementary.matrices import norms
 from space_robot_model.hardware.base_actuators import BaseActuatorSettings
-from space_robot_model.hardware.capability import actuator_load, carried_momentum
 from space_robot_model.orbit.ephemeris import AssumedOrbit, Ephemeris
 from space_robot_model.robot import Robot
 from space_robot_model.robot.momentum import Motion, robot_momentum
@@ -33,6 +32,7 @@ from space_robot_sim.environment.orbit import OrbitSettings
 from space_robot_sim.plant.tick import REPORT_TICKS, PlantMemory, update_true_state
 
 from ..scenario.resolved import ResolvedScenario
+from .capability import actuator_load, carried_momentum
 
 Array = NDArray[np.float64]
 

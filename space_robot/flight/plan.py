@@ -52,16 +52,8 @@ class Flight:
 
     def build_controller(self, law: ControlLaw) -> Controller:
         """Build a controller without memory, with ``law`` in force."""
-        settings = self.controller_settings
-        return Controller(
-            self.scenario.robots.controller,
-            law,
-            self.period,
-            settings.acceleration_filter_hz,
-            settings.filter_settings,
-            self.scenario.assumed_actuators,
-            settings.allocation,
-        )
+        robot, actuators = self.scenario.robots.controller, self.scenario.assumed_actuators
+        return Controller.from_settings(robot, law, self.controller_settings, actuators)
 
     @property
     def controls_base(self) -> bool:

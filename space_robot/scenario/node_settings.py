@@ -8,8 +8,8 @@ from typing import Any, NamedTuple
 
 from pydantic import ValidationError
 
-from space_robot_control.controller.gains import gains_as_path, split_gains
-from space_robot_control.controller.settings import ControllerNodeSettings
+from space_robot_control.controller.gains import split_gains
+from space_robot_control.controller.settings import ControllerNodeSettings, gains_as_path
 from space_robot_control.guidance.mission import MissionNodeSettings, pointing_start
 from space_robot_control.laws import ControlLaw
 from space_robot_control.navigation.settings import assumed_numbers
@@ -20,7 +20,7 @@ from space_robot_msgs_py.config.settings import NodeSettings
 from space_robot_msgs_py.config.validation import one_of, validate
 from space_robot_msgs_py.errors import InputError, explained_by
 from space_robot_sim.environment.events import Capture
-from space_robot_sim.environment.neighbouring_orbit import meet
+from space_robot_sim.environment.neighbouring_orbit import target_state
 from space_robot_sim.plant.settings import PlantNodeSettings
 
 SCHEMAS: tuple[type[NodeSettings], ...] = (
@@ -156,7 +156,7 @@ def with_assumed_orbit(
     }
     targets = [e.target for e in plant.parsed_events if isinstance(e, Capture)]
     for target in [target for target in targets if target.is_in_orbit][:1]:
-        start = meet(target, plant, 0.0)
+        start = target_state(target, plant, 0.0)
         place = {"position": start.position.tolist(), "velocity": start.motion.velocity}
         with suppress(ValidationError):  # too far or too fast to be pointed at
             known["target"] = AssumedTarget(name=target.name, **place).model_dump()

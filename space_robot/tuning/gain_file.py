@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from space_robot_control.controller.gains import NOMINAL as IN_FILES
+from space_robot_control.controller.gains import NOMINAL_H_BAR as IN_FILES
 from space_robot_control.controller.settings import OF_THE_SET
 
 from .method import Tuned

@@ -124,9 +124,9 @@ def semi_floating_inertia(robot: Robot, joint_positions: Array) -> Array:
     count, n = joint_positions.shape
     angular = np.zeros((n + 1, count, 3, n + 3))
     linear = np.zeros_like(angular)
-    x, y, z = (np.repeat(axis[:, np.newaxis], count, axis=1) for axis in np.eye(3))
+    still = np.repeat(np.eye(3)[:, :, np.newaxis], count, axis=2)
     frames: dict[int, BodyFrame] = {}
-    for frame in body_frames(robot, (x, y, z), joint_positions.T):
+    for frame in body_frames(robot, still, joint_positions.T):
         body = frame.body
         frames[body] = frame
         com = (frame.origin + frame.on_outer_axes(robot.com[body])).T

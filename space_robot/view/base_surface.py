@@ -58,7 +58,7 @@ def _hidden_share(
         direction: (3,) unit vector to a camera far away, inertial axes.
     """
     boxes, still = _boxes(robot), np.eye(3)[:, :, np.newaxis]
-    frames = {f.body: f for f in body_frames(robot, tuple(still), joint_positions.T)}
+    frames = {f.body: f for f in body_frames(robot, still, joint_positions.T)}
     points = [frames[joint + 1].origin for joint in range(robot.n)]
     points += [
         frames[tool.body].origin + frames[tool.body].on_outer_axes(tool.position)

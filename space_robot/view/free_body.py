@@ -150,7 +150,7 @@ def held_poses(grasp: Grasp, log: FlightLog, robot: Robot) -> tuple[Array, Array
         (N, 3) centre of mass, m, inertial frame; (N, 3, 3) rotation matrices of the grasping body.
     """
     axes = base_axes(log.quaternion.T)
-    frames = body_frames(robot, tuple(axes), log.all_positions.T)
+    frames = body_frames(robot, axes, log.all_positions.T)
     carrier = next(frame for frame in frames if frame.body == grasp.body)
     positions = log.base_position + (carrier.origin + carrier.on_outer_axes(grasp.com)).T
     return positions, np.stack([carrier.x.T, carrier.y.T, carrier.z.T], axis=2)

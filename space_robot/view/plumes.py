@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from space_robot_model.hardware.thrusters import ThrusterSettings
+from space_robot_model.hardware.base_actuators import ThrusterSettings
 from space_robot_model.robot import Robot
 from space_robot_msgs_py.bag.flight_log import FlightLog
 

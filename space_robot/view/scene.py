@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from space_robot_model.elementary.rotations import quaternion_of_rotation
 from space_robot_model.robot import Robot
 from space_robot_model.robot.parts import Visual
 from space_robot_model.robot.placements import (
@@ -15,7 +16,6 @@ from space_robot_model.robot.placements import (
     frame_names,
     joint_transforms,
     tool_transforms,
-    wxyz,
 )
 
 from .mesh import Mesh
@@ -144,7 +144,7 @@ def add_shape(
     red, green, blue = (round(255 * value) for value in own)
     colour = rgb(look.tint) if look.tint else (red, green, blue)
     opacity = alpha * look.opacity if alpha * look.opacity < 1.0 else None
-    position, turn, more = shape.position, wxyz(shape.rotation), look.growth
+    position, turn, more = shape.position, quaternion_of_rotation(shape.rotation), look.growth
     if not look.tint and not look.growth and (parts := parts_of(shape)):
         first, *others = parts
         node = _add_part(scene, path, first, look, position, turn)

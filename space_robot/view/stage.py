@@ -10,9 +10,10 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from space_robot_model.elementary.matrices import unit_rows
+from space_robot_model.elementary.rotations import quaternion_of_rotation
 from space_robot_model.robot import Robot
 from space_robot_model.robot.parts import Visual
-from space_robot_model.robot.placements import base_axes, body_frames, wxyz
+from space_robot_model.robot.placements import base_axes, body_frames
 from space_robot_msgs_py.config.installation import install_command
 from space_robot_msgs_py.errors import InputError
 
@@ -180,7 +181,7 @@ def _light(scene: SceneApi, axes: Array, sun: Array | None) -> DirectionalLightH
                 intensity=strength,
                 position=tuple(direction),
                 cast_shadow=number == 0,
-                wxyz=wxyz(turn.as_matrix()),
+                wxyz=quaternion_of_rotation(turn.as_matrix()),
             )
         )
     return lamps[0]
@@ -206,7 +207,7 @@ def extent(robot: Robot, position: Array, quaternion: Array, joint_positions: Ar
         joint_positions: (T, N) of all joints, rad or m.
     """
     axes = base_axes(quaternion.T)
-    frames = {f.body: f for f in body_frames(robot, tuple(axes), joint_positions.T)}
+    frames = {f.body: f for f in body_frames(robot, axes, joint_positions.T)}
     corners = []
     drawn = shown_shapes(robot)
     for shape in drawn.shapes:

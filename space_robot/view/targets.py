@@ -18,7 +18,7 @@ from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.simulated_time import tick_from
 from space_robot_sim.environment.events import Capture, Event, Release
 from space_robot_sim.environment.impact import Grasp
-from space_robot_sim.environment.neighbouring_orbit import fall
+from space_robot_sim.environment.neighbouring_orbit import free_fall
 
 from ..analysis.described import captures_of, events_of, orbit_of
 from ..analysis.momentum import happens_in
@@ -90,9 +90,9 @@ def _as_met(event: Capture, log: FlightLog) -> Capture | None:
     row = int(exchange.tick) - log.first_tick
     if 0 <= row < log.ticks:
         happens_in(captures, exchange, log.rows(row, row + 1))
-    if exchange.tick in captures.misses or exchange.meeting is None:
+    if exchange.tick in captures.misses or exchange.target_state is None:
         return None
-    motion = {"motion": exchange.meeting.motion}
+    motion = {"motion": exchange.target_state.motion}
     return replace(event, target=event.target.model_copy(update=motion))
 
 
@@ -111,12 +111,12 @@ def _drifts(
     moment = tick_from(event.time_s, period) * period
     body = before_capture(met, log, robot) if met else None
     if met is None:  # it flies past
-        positions, axes = fall(event.target, orbit_of(log), times)
+        positions, axes = free_fall(event.target, orbit_of(log), times)
         own = Rotation.from_matrix(grasp.tool_axes @ event.target.rotation)
         turns = Rotation.from_quat(axes, scalar_first=True) * own.inv()
         yield "free", Drift(0, positions, turns.as_quat(scalar_first=True))
     elif body is not None and start > 0 and event.target.is_in_orbit:
-        positions, axes = fall(event.target, orbit_of(log), np.append(times[:start], moment))
+        positions, axes = free_fall(event.target, orbit_of(log), np.append(times[:start], moment))
         turns = Rotation.from_quat(axes, scalar_first=True)
         # the box is drawn in the axes of the body that will hold it
         fixed = turns[-1].inv() * Rotation.from_matrix(body.rotation)

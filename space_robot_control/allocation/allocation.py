@@ -21,7 +21,7 @@ from space_robot_model.dynamics.algebra import subtract, vector
 from space_robot_model.hardware.base_actuators import BaseActuatorSettings
 from space_robot_msgs_py.compiled.kernels import RecordFunction, kernel, subroutine
 from space_robot_msgs_py.compiled.records import Record, assign, nested, shaped
-from space_robot_msgs_py.samples import MOST_THRUSTERS, MOST_TORQUERS, MOST_WHEELS
+from space_robot_msgs_py.samples import MOST_ACTUATORS, MOST_WHEELS
 
 from .settings import AllocationSettings
 from .thrusters import AssumedThrusters, expect_torque, modulate
@@ -39,7 +39,7 @@ class Allocation(Record):
     thrusters: AssumedThrusters = nested(AssumedThrusters)
     torquers: AssumedTorquers = nested(AssumedTorquers)
     unloading: Unloading = nested(Unloading)
-    of_thrusters: Array = shaped(lambda n: (3,), "Torque demanded of the thrusters, N m")
+    thruster_demand: Array = shaped(lambda n: (3,), "Torque demanded of the thrusters, N m")
     expected: Array = shaped(lambda n: (3,))
     """Torque expected of the thrusters from the present tick to the next, N m."""
     demand: Array = shaped(lambda n: (3,), "Torque demanded of the base, N m, base frame")
@@ -47,7 +47,7 @@ class Allocation(Record):
     """Speeds of the wheels at the present tick, rad/s."""
     reported_torques: Array = shaped(lambda n: (MOST_WHEELS,))
     """Torques of the wheels' motors since the last tick, N m."""
-    command: Array = shaped(lambda n: (MOST_WHEELS + MOST_THRUSTERS + MOST_TORQUERS,))
+    command: Array = shaped(lambda n: (MOST_ACTUATORS,))
     """Torque of each wheel's motor, N m, force of each thruster, N, dipole of each magnetic
     torquer, A m2."""
 
@@ -75,13 +75,11 @@ def allocate(allocation: Allocation, tick: float) -> None:
     ``demand``, what the wheels report at ``tick`` and the magnetic field are read.
     """
     wheels, thrusters, torquers = allocation.wheels, allocation.thrusters, allocation.torquers
-    command, wheel_count, thruster_count = (
-        allocation.command,
-        int(wheels.count),
-        int(thrusters.count),
-    )
+    command, wheel_count = allocation.command, int(wheels.count)
+    thruster_count = int(thrusters.count)
     if wheel_count > 0:
         observe_wheels(wheels, tick, allocation.reported_speeds, allocation.reported_torques)
+    # thrusters and torquers first: the wheels give what these are not expected to give
     if thruster_count > 0:
         _allocate_thrusters(allocation, int(tick))
         for j in range(thruster_count):
@@ -100,14 +98,15 @@ def allocate(allocation: Allocation, tick: float) -> None:
 
 @subroutine
 def _allocate_thrusters(allocation: Allocation, tick: int) -> None:
-    wheels, demand = allocation.wheels, allocation.of_thrusters
+    wheels, demand = allocation.wheels, allocation.thruster_demand
     find_unloading(allocation.unloading, wheels, demand)
+    # of axes that no healthy wheel turns, thrusters have all of the demand
     if wheels.healthy.rank < 3.0:
         for i in range(3):
             for j in range(3):
                 demand[i] += wheels.healthy.beyond[i, j] * allocation.demand[j]
     for i in range(3):
-        if not np.isfinite(demand[i]):  # no law's accident is to be owed for good
+        if not np.isfinite(demand[i]):  # it would stay in the impulse owed for good
             demand[i] = 0.0
     modulate(allocation.thrusters, tick, demand)
     expect_torque(allocation.thrusters, tick, allocation.expected)
@@ -120,10 +119,8 @@ def leave_alone(allocation: Allocation, tick: float) -> None:
 
 @cache
 def allocation_code(is_used: bool) -> RecordFunction:
-    """Return `allocate`, or an empty function without hardware, for compiled loops.
-
-    Given as a value it is compiled once, and not into every loop; without hardware not at all.
-    """
+    """Return `allocate`, or an empty function without hardware, for compiled loops."""
+    # as a value it is compiled once, and not into every loop; without hardware not at all
     record = (Allocation,)
     return RecordFunction(allocate if is_used else leave_alone, record, record)
 

@@ -54,6 +54,7 @@ def solve(problem: NonNegative, count: int) -> None:
             gradient = right[j]
             for k in range(count):
                 gradient -= gram[j, k] * x[k]
+            # per unit length of the column, so that the choice does not depend on units
             gradient /= np.sqrt(gram[j, j])
             if gradient > best:
                 best, chosen = gradient, j

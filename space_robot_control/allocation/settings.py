@@ -23,9 +23,6 @@ def assumed_actuators(name: str, robot: Robot) -> BaseActuatorSettings:
 
     Parameters of the plant alone (a misaligned wheel, a weak thruster) are left out: the controller
     does not know them.
-
-    Raises:
-        InputError: there is no such file, or it is wrong for ``robot``.
     """
     actuators = read_sheet(BaseActuatorSettings, "actuators", name)
     actuators.check(robot, name)
@@ -33,7 +30,7 @@ def assumed_actuators(name: str, robot: Robot) -> BaseActuatorSettings:
 
 
 class AllocationSettings(StrictModel):
-    """How a torque on the base is shared out among wheels and thrusters."""
+    """How a torque on the base is allocated to wheels, thrusters and magnetic torquers."""
 
     wheels: WheelAllocation = Field(
         "pseudo_inverse",
@@ -95,16 +92,6 @@ class AllocationSettings(StrictModel):
     unload_time: Annotated[float, Field(ge=1e-3, le=1e6)] = Field(
         20.0, description="time constant of unloading, s"
     )
-
-    @property
-    def torquers_unload(self) -> bool:
-        """True if magnetic torquers unload the wheels."""
-        return self.dump in ("all", "magnetic")
-
-    @property
-    def thrusters_unload(self) -> bool:
-        """True if thrusters unload the wheels."""
-        return self.dump in ("all", "thrusters")
 
     @model_validator(mode="after")
     def _thresholds_are_apart(self) -> Self:

@@ -29,7 +29,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from space_robot_model.elementary.matrices import product
-from space_robot_model.hardware.thrusters import ThrusterSettings
+from space_robot_model.hardware.base_actuators import ThrusterSettings
 from space_robot_msgs_py.compiled.kernels import kernel, subroutine
 from space_robot_msgs_py.compiled.records import Record, assign, nested, shaped
 from space_robot_msgs_py.samples import MOST_THRUSTERS
@@ -128,6 +128,7 @@ class AssumedThrusters(Record):
             forget=min(1.0, period / FORCE_TIME),
         )
         assign(thrusters.problem, gram=product(wrench, wrench.T))
+        # thrusters push one way: each sense of an axis has a reach of its own
         for row, side in enumerate((1.0, -1.0) if count else ()):
             for i in range(3):
                 find_times(thrusters, side * np.eye(6)[i])
@@ -139,7 +140,7 @@ class AssumedThrusters(Record):
 def modulate(thrusters: AssumedThrusters, tick: int, demand: Array) -> None:
     """Write which thrusters are open from ``tick`` on, for a ``demand`` (3,) N m."""
     count, owed, open_for = int(thrusters.count), thrusters.owed, thrusters.open_for
-    if tick != thrusters.modulated_at + 1.0:  # nobody knows what was given meanwhile
+    if tick != thrusters.modulated_at + 1.0:  # what was given meanwhile is not known
         owed[:] = 0.0
         thrusters.slot_left = 0.0
         open_for[:] = 0.0
@@ -154,6 +155,7 @@ def modulate(thrusters: AssumedThrusters, tick: int, demand: Array) -> None:
     thrusters.slot_left -= 1.0
     for i in range(3):
         owed[i] += thrusters.reach * demand[i] * thrusters.period
+        # no force is demanded, and what is owed fades
         owed[3 + i] -= owed[3 + i] * thrusters.forget
     for j in range(count):
         is_open = 1.0 if open_for[j] > 0.0 else 0.0
@@ -168,6 +170,7 @@ def modulate(thrusters: AssumedThrusters, tick: int, demand: Array) -> None:
 def _decide(thrusters: AssumedThrusters) -> None:
     """Set the opening time of each valve."""
     impulse, open_for, period = thrusters.impulse, thrusters.open_for, thrusters.period
+    # e as it will be at the end of the slot, if nothing is given
     for i in range(6):
         ahead = thrusters.reach * thrusters.demand[i] * thrusters.slot * period
         impulse[i] = thrusters.owed[i] + ahead
@@ -189,7 +192,7 @@ def _decide(thrusters: AssumedThrusters) -> None:
 def _trigger(thrusters: AssumedThrusters) -> None:
     """Open and close thrusters by the Schmitt trigger; ``impulse`` is what is owed."""
     impulse, open_for = thrusters.impulse, thrusters.open_for
-    for j in range(int(thrusters.count)):  # what is under way is as good as given
+    for j in range(int(thrusters.count)):  # the rest of an open pulse counts as given
         for i in range(6):
             impulse[i] -= thrusters.wrench[j, i] * open_for[j] * thrusters.period
     for j in range(int(thrusters.count)):

@@ -53,7 +53,7 @@ class AssumedTorquers(Record):
     ) -> AssumedTorquers:
         """Read the numbers of the settings for a robot of ``n`` joints."""
         torquers, count = cls.allocate(n), assumed.count
-        gain = settings.magnetic_gain if settings.torquers_unload else 0.0
+        gain = settings.magnetic_gain if settings.dump in ("all", "magnetic") else 0.0
         assign(torquers, count=count, gain=gain)
         torquers.axis[:count] = assumed.unit_axes
         torquers.max_dipole[:count] = assumed.values("max_dipole")
@@ -70,6 +70,7 @@ def dump_momentum(torquers: AssumedTorquers, momentum: Vector) -> None:
     """
     field = vector(torquers.magnetic_field, 0)
     square = dot(field, field)
+    # m = k (h x B) / |B|^2
     rate = torquers.gain / square if square > LEAST_FIELD * LEAST_FIELD else 0.0
     wanted = scale(cross(momentum, field), rate)
     excess = 1.0
@@ -97,7 +98,7 @@ class Unloading(Record):
     def build(cls, n: int, settings: AllocationSettings) -> Unloading:
         """Read the settings."""
         unloading = cls.allocate(n)
-        above = settings.unload_above if settings.thrusters_unload else np.inf
+        above = settings.unload_above if settings.dump in ("all", "thrusters") else np.inf
         assign(unloading, above=above, to=settings.unload_to, rate=1.0 / settings.unload_time)
         return unloading
 
@@ -112,6 +113,7 @@ def find_unloading(unloading: Unloading, wheels: AssumedWheels, torque: Array) -
         unloading.is_active = 1.0
     elif fullest < unloading.to:
         unloading.is_active = 0.0
+    # the wheels have to give what the thrusters take from them, beside the demand
     rate, excess = unloading.rate * unloading.is_active, 1.0
     for k in range(int(wheels.count)):
         load = abs(dot(vector(wheels.healthy.inverse[k], 0), momentum)) * rate

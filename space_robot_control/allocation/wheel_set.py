@@ -76,6 +76,7 @@ def tabulate(wheels: WheelSet, axis: Array, count: int) -> None:
             for k in range(count):
                 total += wheels.column[k, i] * wheels.column[k, j]
             matrix[i, j] = total
+    # A A^T of the weighed axes, of which the pseudo-inverse is A^T (A A^T)^+
     diagonalise(matrix, vectors)
     largest = max(matrix[0, 0], matrix[1, 1], matrix[2, 2])
     inverse[:] = 0.0
@@ -116,6 +117,7 @@ def _tabulate_facets(wheels: WheelSet, count: int) -> None:
             distance = 0.0
             for k in range(count):
                 distance += abs(dot(vector(column[k], 0), normal))
+            # at the facet's distance every wheel has its full load, in the sense of the normal
             facet = (normal[0] / distance, normal[1] / distance, normal[2] / distance)
             store(facet, wheels.facet[int(wheels.pairs)], 0)
             wheels.pairs += 1.0
@@ -131,6 +133,7 @@ def _tabulate_null(wheels: WheelSet, axis: Array, count: int) -> None:
     if members <= wheels.rank:
         return
     best = 0.0
+    # half of the patterns: the others are their negatives
     for pattern in range(1 << max(count - 1, 0)):
         least, largest = _null_parts(wheels, axis, count, pattern, False)
         if largest > 0.0 and least / largest > best * (1.0 + 1e-9):

@@ -2,7 +2,7 @@
 
 A demand beyond the motors' torques is scaled as a whole: it keeps its direction. A wheel that has
 its largest momentum cannot speed up any more: it gives what it can, and the others take the rest
-by least squares, so that the axes that it does not turn are as good as before.
+by least squares, so that axes that it does not turn lose nothing.
 
 **Null motion.** The wheels' momenta h fall into ``A^+ A h``, which is what they store for the base,
 and z in the null space of A. The null motion takes z to ``c n``, n the null vector of `WheelSet`,
@@ -25,7 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from space_robot_model.dynamics.algebra import Vector, add, dot, scale, subtract, vector
-from space_robot_model.hardware.wheels import WheelSettings
+from space_robot_model.hardware.base_actuators import WheelSettings
 from space_robot_msgs_py.compiled.kernels import kernel, subroutine
 from space_robot_msgs_py.compiled.records import Record, assign, nested, shaped
 from space_robot_msgs_py.samples import MOST_WHEELS
@@ -149,7 +149,7 @@ def stored_momentum(wheels: AssumedWheels) -> Vector:
 @subroutine
 def _share_torque(wheels: AssumedWheels, demand: Vector) -> None:
     count, torque = int(wheels.count), wheels.torque
-    wanted = (-demand[0], -demand[1], -demand[2])
+    wanted = (-demand[0], -demand[1], -demand[2])  # motors push back on the base
     if wheels.is_least_largest == 1.0 and wheels.healthy.rank == 3.0:
         least_largest(wheels.healthy, count, wanted, torque)
     else:
@@ -161,6 +161,7 @@ def _share_torque(wheels: AssumedWheels, demand: Vector) -> None:
         free.takes_part[k] = wheels.healthy.takes_part[k]
     is_full = _take_out_full(wheels)
     wheels.full_ticks += 1.0 if is_full else 0.0
+    # ends: each round takes at least one wheel out
     while is_full:
         tabulate(free, wheels.axis, count)
         left = wanted
@@ -178,15 +179,13 @@ def _share_torque(wheels: AssumedWheels, demand: Vector) -> None:
 
 @kernel
 def scale_down(wheels: AssumedWheels, torque: Array) -> bool:
-    """Scale all torques to the motors' limits; return whether a limit was exceeded.
-
-    No torque is above its limit by so much as a rounding, and the largest one is exactly at it.
-    """
+    """Scale all torques to the motors' limits; return whether a limit was exceeded."""
     excess = 1.0
     for k in range(int(wheels.count)):
         excess = max(excess, abs(torque[k]) / wheels.max_torque[k])
     if excess > 1.0:
         for k in range(int(wheels.count)):
+            # in this order of operations the largest torque is its limit to the last bit
             load = torque[k] / wheels.max_torque[k]
             if load != 0.0:
                 torque[k] = load / excess * wheels.max_torque[k]
@@ -289,12 +288,7 @@ def _null_cost(wheels: AssumedWheels, c: float) -> float:
 
 @kernel
 def observe_wheels(wheels: AssumedWheels, tick: float, speeds: Array, torques: Array) -> None:
-    """Evaluate the wheels' speeds and torques at ``tick``; exclude failed wheels.
-
-    A wheel counts as silent by size alone: with a sign, commands that are some ticks late would
-    make any wheel look wrong. Where several wheels are asked and none answers, it is the commands
-    that do not arrive, and no wheel is blamed.
-    """
+    """Evaluate the wheels' speeds and torques at ``tick``; exclude failed wheels."""
     count, healthy = int(wheels.count), wheels.healthy
     for k in range(count):
         wheels.momentum[k] = wheels.inertia[k] * speeds[k] * healthy.takes_part[k]
@@ -303,9 +297,11 @@ def observe_wheels(wheels: AssumedWheels, tick: float, speeds: Array, torques: A
     heard, silent = 0.0, 0.0
     for k in range(count):
         if _is_asked(wheels, k):
+            # by size alone: with a sign, late commands would make any wheel look wrong
             is_silent = abs(torques[k]) < LEAST_GIVEN * abs(wheels.asked[k])
             silent += 1.0 if is_silent else 0.0
             heard += 0.0 if is_silent else 1.0
+    # where several are asked and none answers, it is the commands that do not arrive
     if heard == 0.0 and silent > 1.0:
         return
     has_failed = False

@@ -1,4 +1,4 @@
-"""Gain sets: files, validation, and the laws built from them."""
+"""Gains: reading, validation, and the laws built from them."""
 
 from __future__ import annotations
 
@@ -11,15 +11,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from space_robot_model.robot.find import new_command, remake_advice, robot_files
-from space_robot_msgs_py.config.files import GIVEN, Tree, nest, node_parameters
+from space_robot_model.robot.find import remake_advice
+from space_robot_msgs_py.config.files import Tree, nest, node_parameters
 from space_robot_msgs_py.config.text import one_line_of
-from space_robot_msgs_py.config.validation import one_of, read_yaml, short
-from space_robot_msgs_py.config.yaml_text import check_readable, is_folder
+from space_robot_msgs_py.config.validation import one_of, short
 from space_robot_msgs_py.errors import InputError, SpaceRobotError
 
 from ..laws import ControlLaw, find_law, laws
-from .settings import DEFAULT, DEFAULT_SETS, OF_THE_SET, ControllerNodeSettings
+from .settings import DEFAULT, ControllerNodeSettings, gain_files
 
 Array = NDArray[np.float64]
 
@@ -27,74 +26,13 @@ STRICTLY_POSITIVE = ("h_bar", "inertia", "delta")
 """Gains used as divisors; other gains may be zero."""
 FRACTIONS = ("spread",)
 """Gains that must be below 1."""
-NOMINAL = "nominal"
+NOMINAL_H_BAR = "nominal"
 """``h_bar`` for a time-delay estimate with the inertia of the nominal model; as numbers: zeros."""
 PARAMETERS = "controller parameters"
 
 
-def gain_files(robot: str, gain_set: str) -> dict[str, Path]:
-    """Return the gain file of each law, by name, for a robot (name or path) and a set.
-
-    ``gain_set`` is ``default``, a folder's name among the robot's gains (``config/gains/<robot>``,
-    or ``gains`` in its own folder), or a path to a folder of ``<law>.yaml`` or to one such file.
-
-    Raises:
-        InputError: the set does not exist; the message lists the available sets.
-    """
-    path = Path(gain_set)
-    if gain_set.endswith((".yaml", ".yml")):
-        check_readable(path)
-        return {path.stem: path}
-    if "/" in gain_set:
-        return _files(path)
-    files = robot_files(robot)
-    if robot == GIVEN:
-        raise InputError("a robot that no file tells has no gains of its own: give some")
-    if (folder := files.gains) is None:
-        raise InputError(
-            f"robot {short(robot)} has no gains of its own: `{new_command(robot)}` makes "
-            "gains and a mission for it; or name a folder of <law>.yaml files as gains"
-        )
-    if gain_set == DEFAULT:
-        if not (folder / DEFAULT_SETS).is_file():
-            return _files(folder)
-        chosen = read_yaml(folder / DEFAULT_SETS)
-        return {law: folder / str(name) / f"{law}.yaml" for law, name in chosen.items()}
-    one_of(gain_set, [DEFAULT, *_sets(folder)], "gain set", f" of robot {short(files.name)}")
-    return _files(folder / gain_set)
-
-
-def _sets(folder: Path) -> list[str]:
-    return sorted(entry.name for entry in folder.iterdir() if entry.is_dir())
-
-
-def _files(folder: Path) -> dict[str, Path]:
-    files = sorted(folder.glob("*.yaml")) if is_folder(folder) else []
-    gains = {file.stem: file for file in files if file.name != OF_THE_SET}
-    if not gains:
-        raise InputError(f"{short(str(folder))}: no folder with gain files (<law>.yaml)")
-    return gains
-
-
-def gains_as_path(gain_set: str, robot: str) -> str:
-    """Resolve a user's gain set: ``g`` is the folder ``g/`` if no set has that name.
-
-    Not for names out of bags: these open no folder of the user's.
-    """
-    if "/" in gain_set or gain_set == DEFAULT:
-        return gain_set
-    with suppress(InputError):  # of a bag: a robot that is not here
-        if (own := robot_files(robot).gains) and gain_set in _sets(own):
-            return gain_set
-    return f"{gain_set}/" if gain_set and is_folder(Path(gain_set)) else gain_set
-
-
 def read_gains(path: Path, law: type[ControlLaw], axes: int) -> dict[str, Array]:
-    """Read a law's gains from its section in a ROS parameter file of the controller.
-
-    Raises:
-        InputError: naming file, key, value given and values allowed.
-    """
+    """Read a law's gains from its section in a ROS parameter file of the controller."""
     tree = node_parameters(path, ControllerNodeSettings.node)
     if not isinstance(tree.get(law.name), dict):
         raise InputError(f"{path}: {law.name}: missing (the gains of this law)")
@@ -106,12 +44,8 @@ def check_gains(
 ) -> dict[str, Array]:
     """Return gains as (axes,) arrays; a list of one value applies to all axes.
 
-    Args:
-        content: numbers by name.
-        law: whose gains they are.
-        axes: m = n+3.
-        where: name of the source, for errors.
-        advice: what to do where they are for another number of axes.
+    ``where`` names the source in errors; ``advice`` says what to do where the gains are for another
+    number of axes.
 
     Raises:
         InputError: a gain is missing, unknown, of the wrong length or out of its range.
@@ -147,7 +81,7 @@ def gain_range(name: str) -> str:
     text = f"finite values {'above 0' if name in STRICTLY_POSITIVE else '0 or more'}"
     if name in FRACTIONS:
         return f"{text} and below 1"
-    return f"{text} (or {NOMINAL}: as numbers all 0)" if name == "h_bar" else text
+    return f"{text} (or {NOMINAL_H_BAR}: as numbers all 0)" if name == "h_bar" else text
 
 
 def gain_lengths(axes: int) -> str:
@@ -159,7 +93,7 @@ def _numbers(name: str, value: Any) -> Array | None:
     """Return the numbers of a gain; None for other values, booleans and texts included."""
     if isinstance(value, np.ndarray):
         return value
-    if name == "h_bar" and (value == NOMINAL or value in ([NOMINAL], (NOMINAL,))):
+    if name == "h_bar" and (value == NOMINAL_H_BAR or value in ([NOMINAL_H_BAR], (NOMINAL_H_BAR,))):
         return np.zeros(1)
     if not isinstance(value, (list, tuple)):
         return None
@@ -176,18 +110,10 @@ def build_law(
     axes: int,
     overrides: Mapping[str, Any] | None = None,
 ) -> ControlLaw:
-    """Build a law with the gains of the settings.
+    """Build a law with the gains of the settings, and ``overrides`` over these.
 
-    Args:
-        law: its name (as `find_law` takes it) or class; or an object, which brings its gains and is
-            copied.
-        settings: they choose its gains.
-        axes: m = n+3.
-        overrides: gains that come over those.
-
-    Raises:
-        InputError: unknown law, gain set without it, gains that do not fit, or an object that is
-            for another robot or period.
+    ``law`` is a name as `find_law` takes it, a class, or an object, which brings its gains and is
+    copied.
     """
     if isinstance(law, str):
         law = find_law(law)
@@ -233,14 +159,8 @@ def build_laws(
 ) -> dict[str, ControlLaw]:
     """Build all laws of a controller, by name: the law in force first, then the gain set's.
 
-    Args:
-        settings: they choose the law in force and the gains.
-        axes: m = n+3.
-        overrides: gains by law that come over those of the files.
-        own: the law in force as a class or an object, which brings its gains; it is copied.
-
-    Raises:
-        InputError: a law does not exist, or its gains do not fit.
+    ``overrides`` are gains by law that come over those of the files; ``own`` is the law in force as
+    a class or an object, see `build_law`.
     """
     overrides = overrides or {}
     first = own if not isinstance(own, str) else find_law(settings.controller)

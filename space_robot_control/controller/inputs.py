@@ -34,8 +34,8 @@ MOST_AT_ONCE = 100
 DRAIN_S = 0.01
 """Longest search for a reference among received messages, s."""
 TIMEOUT_S = 0.02
-WAIT_TOLD_S = 0.5
-"""Wait from which it is reported, s."""
+OVERDUE_S = 0.5
+"""Wait after which a missing reference is reported, s."""
 
 
 class StateInput:
@@ -57,7 +57,7 @@ class StateInput:
         )
         self._first, self._timebase = self.inputs[0], timebase
         self._ahead: dict[RawSubscription, bytes] = {}
-        """Parts of later ticks than the one that was looked for, whose own were never heard."""
+        """Parts of later ticks, taken while one was looked for that had never been received."""
         self._waits = {entry: Wait(TIMEOUT_S, (entry,), is_brief=True) for entry in self.inputs}
         self._newest = -1
         """Tick of the first part that was taken last."""
@@ -66,7 +66,7 @@ class StateInput:
         self._lacking: deque[RawSubscription] = deque()
         """Parts that have not arrived yet."""
         self._until = 0.0
-        """How long they are waited for; 0: none has been looked for in vain yet."""
+        """When the wait for them ends; 0: all were there so far."""
 
     @property
     def wait(self) -> Wait:
@@ -104,7 +104,7 @@ class StateInput:
             if stamped == tick:
                 self.codec.decode(entry.topic, data, self.state)
                 return True
-            if stamped > tick:
+            if stamped > tick:  # reliable topics keep their order
                 self._ahead[entry] = data
                 return False
         return None
@@ -115,6 +115,7 @@ class StateInput:
 
     def _take_first(self) -> bool:
         """Take the newest joints' part, if one has arrived."""
+        # older states are passed over: their commands would come too late
         first, data = self._first, None
         while (newer := first.take()) is not None:
             data = newer
@@ -145,12 +146,8 @@ class ReferenceInput:
     ) -> None:
         """Subscribe.
 
-        Args:
-            node: that subscribes.
-            robot: the joints.
-            timebase: conversion between ticks and stamps.
-            timeout_s: longest wait for the mission, s.
-            join_timeout_s: longest wait for its first reference, s; 0: no limit.
+        ``timeout_s`` is the longest wait for the mission, ``join_timeout_s`` that for its first
+        reference (0: no limit).
         """
         self._timeout_s, self._join_timeout_s = timeout_s, join_timeout_s
         self.buffer = ReferenceBuffer(robot.n)
@@ -161,9 +158,9 @@ class ReferenceInput:
         self.is_missing = False
         """True if the reference of the last tick was held."""
         self._until = 0.0
-        """How long the reference that is needed now is waited for; 0: none is."""
+        """When the wait for the reference that is needed now ends; 0: none is awaited."""
         self._waits_since = 0.0
-        """When the wait began that has not ended well yet; 0: none."""
+        """When the wait began that no reference has ended yet; 0: none."""
         codec, buffer = ReferenceCodec(robot.joint_names, timebase), self.buffer
         group = PolledCallbackGroup()
         self.inputs = tuple(
@@ -176,9 +173,9 @@ class ReferenceInput:
         """The wait while `at` has no row."""
 
     @property
-    def is_waited_for(self) -> bool:
-        """True if a reference has been missing long enough to be reported."""
-        return bool(self._waits_since) and time.monotonic() - self._waits_since > WAIT_TOLD_S
+    def is_overdue(self) -> bool:
+        """True if a reference has been missing for `OVERDUE_S`."""
+        return bool(self._waits_since) and time.monotonic() - self._waits_since > OVERDUE_S
 
     @property
     def is_awaited(self) -> bool:
@@ -191,7 +188,7 @@ class ReferenceInput:
         None if they have not come yet (`is_awaited`), or if nothing has come that could be held.
 
         Raises:
-            FlightError: nothing has come in time.
+            FlightError: no reference has come within the join timeout.
         """
         buffer = self.buffer
         if buffer.covers(tick) or self._look_for(tick):

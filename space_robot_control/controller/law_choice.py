@@ -77,13 +77,9 @@ class Swap(NamedTuple):
 
 
 def parse_swaps(texts: Iterable[str], period: float) -> list[Swap]:
-    """Parse planned swaps ``T:LAW``, T in simulated seconds; empty texts are ignored.
+    """Parse planned swaps ``T:LAW``, T in simulated seconds, and sort them by tick.
 
-    Returns:
-        The swaps, sorted by tick.
-
-    Raises:
-        InputError: a text is not ``T:LAW``, or two swaps have the same tick.
+    Empty texts are ignored.
     """
     swaps = sorted(_parse(text, period) for text in texts if text.strip())
     for one, other in itertools.pairwise(swaps):
@@ -128,11 +124,7 @@ class FunctionLaw(ControlLaw):
     function: ClassVar[Force]
 
     def force(self, signals: Signals) -> Array:
-        """Call the function.
-
-        Raises:
-            InputError: the function did not return one number per axis.
-        """
+        """Call the function."""
         force: Array = self.memory.force
         value = np.asarray(type(self).function(signals))
         if value.shape != force.shape:

@@ -25,12 +25,12 @@ from space_robot_msgs_py.wire.stamp_guard import describe_new_time
 from ..allocation.settings import assumed_actuators
 from ..laws import ControlLaw
 from .controller import Controller
-from .gains import NOMINAL, build_laws, check_gains, gain_lengths, gain_range, split_gains
+from .gains import NOMINAL_H_BAR, build_laws, check_gains, gain_lengths, gain_range, split_gains
 from .inputs import ReferenceInput, StateInput
 from .law_choice import LawChoice, parse_swaps
 from .settings import ControllerNodeSettings
-from .supervisor import Mode, StateResponder, Supervisor
-from .tick import ANSWERED, REFUSED
+from .supervisor import StateResponder, Supervisor
+from .tick import ANSWERED, MODES, NOMINAL, REFUSED, SAFE
 
 SupervisorOf = Callable[[Controller, Sequence[ControlLaw], ControllerNodeSettings], Supervisor]
 FLUSH_S = 1.0
@@ -54,7 +54,7 @@ class ControllerLoop:
             controller, settings.hold_ticks, settings.longest_jump
         ),
     ) -> None:
-        """Load the laws' compiled code, so that no tick comes late for it.
+        """Make laws, controller and topics.
 
         ``supervisor_of`` makes the supervisor from the controller, its laws and the settings.
         """
@@ -63,19 +63,12 @@ class ControllerLoop:
         self._laws = LawSet(node, settings, robot.n + 3)
         actuators = assumed_actuators(settings.actuators, robot)
         at_rest = RobotState.allocate(robot.n), Reference.at_rest(robot.n)
-        for law in self._laws.laws:  # compiled code is loaded now: no tick or swap is late for it
+        for law in self._laws.laws:  # loads compiled code: no tick or swap must wait for it
             supervisor = Supervisor(Controller(robot, law, settings.period, actuators=actuators), 0)
             supervisor.judge_stamp(at_rest[0].tick)
             supervisor.answer(*at_rest)
-        self._controller = Controller(
-            robot,
-            self._laws.choice.chosen,
-            settings.period,
-            settings.acceleration_filter_hz,
-            settings.filter_settings,
-            actuators,
-            settings.allocation,
-        )
+        law = self._laws.choice.chosen
+        self._controller = Controller.from_settings(robot, law, settings, actuators)
         timebase = settings.timebase
         self._states = StateInput(node, self._controller.names, timebase)
         self._references = ReferenceInput(
@@ -137,7 +130,9 @@ class ControllerLoop:
                 self._states.reject("stamp")
                 return None
             if tick != last:
-                self._accept(tick, last)
+                if self._answering.supervisor.is_new_time and last >= 0:
+                    self._node.log(describe_new_time(tick, last, self._is_resumed))
+                self._is_resumed, self._state_at = False, time.monotonic()
         reference = self._references.at(tick)
         if reference is None:
             is_awaited = self._references.is_awaited
@@ -181,13 +176,13 @@ class ControllerLoop:
             **allocation.values,
             **{f"rejected: {reason}": count for reason, count in rejected.items()},
         }
-        if references.is_waited_for:
+        if references.is_overdue:
             return Health("waiting for the reference: no mission sends it", Level.WARN, values)
         if supervisor.answered < 0:
             return Health("waiting for the first state", values=values)
-        if supervisor.mode is not Mode.NOMINAL:
-            level = Level.ERROR if supervisor.mode is Mode.SAFE else Level.WARN
-            return Health(f"{supervisor.mode.value}: {supervisor.reason}", level, values)
+        if supervisor.mode != NOMINAL:
+            level = Level.ERROR if supervisor.mode == SAFE else Level.WARN
+            return Health(f"{MODES[supervisor.mode]}: {supervisor.reason}", level, values)
         if silence > self._settings.state_timeout:
             values["silence_s"] = silence
             return Health("safe: no new state, so no command", Level.ERROR, values)
@@ -208,17 +203,10 @@ class ControllerLoop:
         mode = answering.supervisor.mode
         for topic, message in answering.messages(tick, self._states.state, reference):
             self._out[topic].publish(message)
-            if topic is topics.COMMAND and answering.supervisor.mode is not mode:
+            if topic is topics.COMMAND and answering.supervisor.mode != mode:
                 self._node.report()
         if answering.change:
             self._laws.report(answering.change)
-
-    def _accept(self, tick: int, last: int) -> None:
-        """Accept a state with a plausible stamp, which may begin a new time."""
-        if self._answering.supervisor.is_new_time and last >= 0:
-            self._node.log(describe_new_time(tick, last, self._is_resumed))
-        self._is_resumed = False
-        self._state_at = time.monotonic()
 
 
 class LawSet:
@@ -290,7 +278,8 @@ class LawSet:
                     changed = {**gains[law_name], gain: list(parameter.value)}
                     gains[law_name] = check_gains(changed, type(law), self._axes, "parameter")
                     if gain == "h_bar" and any(gains[law_name][gain]) != law.h_bar.any():
-                        kinds = ["a constant", NOMINAL]  # compiled code is that of one of the two
+                        # compiled code is that of one of the two
+                        kinds = ["a constant", NOMINAL_H_BAR]
                         before, after = kinds if law.h_bar.any() else kinds[::-1]
                         raise InputError(
                             f"parameter {law_name}.h_bar cannot be changed from {before} to "

@@ -1,50 +1,109 @@
-"""Parameters of controller_node."""
+"""Parameters of controller_node, and the files of its gain sets."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field, field_validator
 
-from space_robot_model.robot.find import robot_files
+from space_robot_model.robot.find import YAML, new_command, robot_files
 from space_robot_msgs_py import topics
-from space_robot_msgs_py.config.files import named_layers
+from space_robot_msgs_py.config.files import GIVEN, named_layers
 from space_robot_msgs_py.config.settings import NodeSettings, Texts
-from space_robot_msgs_py.config.validation import read_yaml
-from space_robot_msgs_py.config.yaml_text import is_folder
+from space_robot_msgs_py.config.validation import one_of, read_yaml, short
+from space_robot_msgs_py.config.yaml_text import check_readable, is_folder
+from space_robot_msgs_py.errors import InputError
 
 from ..allocation.settings import AllocationSettings
 from ..navigation.settings import NavigationFilterSettings, NavigationMode, completed
 
 OF_THE_SET = "controller.yaml"
 """A file of a gain set with the controller's parameters that belong to its gains; need not be."""
-DEFAULT, DEFAULT_SETS = "default", "default_sets.yaml"
-"""The set that is flown unless another is named, and the file of a robot's gains that says for each
-law which one that is; without such a file the set is the robot's folder of gains itself."""
+DEFAULT, DEFAULT_SETS, OTHERS = "default", "default_sets.yaml", "others"
+"""The set that is flown unless another is named, and the file of a robot's gains that says for a
+law, or for all others, which one that is; without such a file it is the folder of gains itself."""
 
 
-def set_file(robot: str, gains: str) -> list[Path]:
-    """Return the `OF_THE_SET` of a gain set (name, or path to a folder), if it has one.
+def gain_files(robot: str, gain_set: str) -> dict[str, Path]:
+    """Return the gain file of each law, by name, for a robot (name or path) and a set.
+
+    ``gain_set`` is ``default``, a folder's name among the robot's gains (``config/gains/<robot>``,
+    or ``gains`` in its own folder), or a path to a folder of ``<law>.yaml`` or to one such file.
+    """
+    path = Path(gain_set)
+    if gain_set.endswith(YAML):
+        check_readable(path)
+        return {path.stem: path}
+    if "/" in gain_set:
+        return _files(path)
+    files = robot_files(robot)
+    if robot == GIVEN:
+        raise InputError("a robot that no file tells has no gains of its own: give some")
+    if (folder := files.gains) is None:
+        raise InputError(
+            f"robot {short(robot)} has no gains of its own: `{new_command(robot)}` makes "
+            "gains and a mission for it; or name a folder of <law>.yaml files as gains"
+        )
+    if gain_set == DEFAULT:
+        if not (chosen := _default_sets(folder)):
+            return _files(folder)
+        others = _files(folder / chosen.pop(OTHERS)) if OTHERS in chosen else {}
+        return others | {law: folder / name / f"{law}.yaml" for law, name in chosen.items()}
+    one_of(gain_set, [DEFAULT, *_sets(folder)], "gain set", f" of robot {short(files.name)}")
+    return _files(folder / gain_set)
+
+
+def set_file(robot: str, gain_set: str) -> list[Path]:
+    """Return the `OF_THE_SET` of a gain set as `gain_files` takes it, if it has one.
 
     The default set has one if it is the same set for all laws.
-
-    Raises:
-        InputError: there is no such robot.
     """
-    folder = Path(gains) if "/" in gains else robot_files(robot).gains
-    if folder is None or gains.endswith((".yaml", ".yml")):
+    folder = Path(gain_set) if "/" in gain_set else robot_files(robot).gains
+    if folder is None or gain_set.endswith(YAML):
         return []
-    if gains == DEFAULT:
-        default = folder / DEFAULT_SETS
-        chosen = set(read_yaml(default).values()) if default.is_file() else {"."}
-        folder = folder / str(chosen.pop()) if len(chosen) == 1 else folder / DEFAULT
-    elif "/" not in gains:
-        folder = folder / gains
+    if gain_set == DEFAULT:
+        names = set(_default_sets(folder).values()) or {"."}
+        if len(names) > 1:
+            return []
+        folder = folder / names.pop()
+    elif "/" not in gain_set:
+        folder = folder / gain_set
     file = folder / OF_THE_SET
     return [file] if is_folder(folder) and file.is_file() else []
+
+
+def gains_as_path(gain_set: str, robot: str) -> str:
+    """Resolve a user's gain set: ``g`` is the folder ``g/`` if no set has that name.
+
+    Not for names out of bags: these open no folder of the user's.
+    """
+    if "/" in gain_set or gain_set == DEFAULT:
+        return gain_set
+    with suppress(InputError):  # of a bag: a robot that is not here
+        if (own := robot_files(robot).gains) and gain_set in _sets(own):
+            return gain_set
+    return f"{gain_set}/" if gain_set and is_folder(Path(gain_set)) else gain_set
+
+
+def _default_sets(folder: Path) -> dict[str, str]:
+    file = folder / DEFAULT_SETS
+    return {law: str(name) for law, name in read_yaml(file).items()} if file.is_file() else {}
+
+
+def _sets(folder: Path) -> list[str]:
+    return sorted(entry.name for entry in folder.iterdir() if entry.is_dir())
+
+
+def _files(folder: Path) -> dict[str, Path]:
+    files = sorted(folder.glob("*.yaml")) if is_folder(folder) else []
+    gains = {file.stem: file for file in files if file.name != OF_THE_SET}
+    if not gains:
+        raise InputError(f"{short(str(folder))}: no folder with gain files (<law>.yaml)")
+    return gains
 
 
 class ControllerNodeSettings(NodeSettings):
@@ -144,11 +203,7 @@ class ControllerNodeSettings(NodeSettings):
 
     @property
     def filter_settings(self) -> NavigationFilterSettings | None:
-        """The numbers of the navigation filter, complete; None: there is none.
-
-        Raises:
-            InputError: the sensors that it is for are not there, or their file is wrong.
-        """
+        """The numbers of the navigation filter, complete; None: there is none."""
         if self.navigation == "direct":
             return None
         return completed(self.navigation_filter, self.navigation_sensors, self.period)

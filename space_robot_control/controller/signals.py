@@ -47,8 +47,7 @@ Array = NDArray[np.float64]
 NORM_TOLERANCE = 1e-3
 """Tolerance of the squared norm of a quaternion."""
 LARGEST = 1e30
-"""No number of a state or reference is larger: far beyond any flight, yet no law's products of
-such numbers overflow."""
+"""Largest number of a state or reference: far beyond any flight, and no law's products overflow."""
 
 USABLE, NOT_FINITE, TOO_LARGE, NOT_UNIT, SINGULAR = range(5)
 """The status of a state."""
@@ -93,41 +92,22 @@ def compute_signals(
     block: Block,
     tick: int,
     state: Block,
-    reference: Block,
     h_bar: Array,
     estimate: int,
     uses_model: bool,
     period: float,
 ) -> int:
-    """Compute the signals from a measured or estimated state and its reference.
+    """Compute the signals from a measured or estimated state and the reference that is in them.
 
     Without a base to control all of them are zero on its axes, and none asks for J0^-1.
 
-    ``block`` is of the `ControllerMemory`; ``state`` and ``reference`` are of a `State` and a
-    `Reference`; ``h_bar``, ``estimate`` and ``uses_model`` are those of a `LawCode`.
+    ``block`` is of the `ControllerMemory`, ``state`` of a `State`; ``h_bar``, ``estimate`` and
+    ``uses_model`` are those of a `LawCode`.
 
     Returns:
         `USABLE`, or why the state is not: then nothing was done, but that navigation may have taken
         a measured state that was usable.
     """
-    copy_reference(reference[0], block[0].signals.reference)
-    status: int = compute_signals_as_desired(
-        block, tick, state, h_bar, estimate, uses_model, period
-    )
-    return status
-
-
-@kernel
-def compute_signals_as_desired(
-    block: Block,
-    tick: int,
-    state: Block,
-    h_bar: Array,
-    estimate: int,
-    uses_model: bool,
-    period: float,
-) -> int:
-    """Compute the signals as `compute_signals`, for the reference that is in them."""
     memory, measured = block[0], state[0]
     signals, controls_base = memory.signals, uniform(memory.controls_base) == 1.0
     reference = signals.reference
@@ -135,6 +115,7 @@ def compute_signals_as_desired(
     status: int = status_of(measured, desired, controls_base)
     if all_lanes(status != USABLE):
         return status
+    # the actuators' allocation needs what was measured, navigation or not
     memory.allocation.reported_speeds[:] = measured.wheel_velocities
     memory.allocation.reported_torques[:] = measured.wheel_torques
     memory.allocation.torquers.magnetic_field[:] = measured.magnetic_field
@@ -148,7 +129,8 @@ def compute_signals_as_desired(
     if controls_base:
         attitude_error_into(desired, measured.quaternion, near)
         attitude_jacobian(near, memory.jacobian)
-        _find_steps_of_reference(memory, tick, period)
+        # while the signals are still those of the last tick
+        _compute_reference_steps(memory, tick, period)
         rotation_matrix(near, memory.rotation)
         rotate_back(memory.rotation, reference.omega_base, memory.omega_desired)
         if not follows(memory.pair, tick):  # whatever J0 was, this one's is nearer
@@ -158,6 +140,7 @@ def compute_signals_as_desired(
             memory.last_jacobian_inverse, measured.applied_torque, signals.applied_force
         )
     else:
+        # a free base has no desired attitude: the model is taken where it is, its axes are zero
         near[:] = measured.quaternion
         signals.applied_force[:] = measured.applied_torque
     _relative_rate(
@@ -187,6 +170,7 @@ def compute_signals_as_desired(
             to_rho_space(near, reference.omega_base, reference.alpha_base, signals.nominal)
         else:
             eliminate_rotation(signals.nominal)
+    # N_hat of (36)
     if estimate == CONSTANT_INERTIA:
         time_delay_estimate(memory.pair, h_bar, signals.n_hat)
     elif estimate == NOMINAL_INERTIA:
@@ -195,13 +179,13 @@ def compute_signals_as_desired(
 
 
 @kernel
-def _find_steps_of_reference(memory: ControllerMemory, tick: int, period: float) -> None:
+def _compute_reference_steps(memory: ControllerMemory, tick: int, period: float) -> None:
     """Write the steps of rho and rhodot since the last tick that the base's reference makes.
 
-    A reference that is held, comes back or comes in steps does not go on where it was. That is no
-    motion of the robot, so whoever compares with the last tick leaves it out: it is what rho and
-    rhodot would have been then, had the reference already moved as it does now, less what they
-    were. The signals but ``attitude_error`` and the reference are still those of the last tick.
+    A reference that is held, comes back or comes in steps does not continue its motion. That is no
+    motion of the robot, so differences to the last tick leave it out: it is what rho and rhodot
+    would have been then, had the reference already moved as it does now, less what they were. All
+    signals but ``attitude_error`` and the reference are still those of the last tick.
     """
     signals, error, turn, omega = memory.signals, memory.error, memory.turn, memory.omega
     reference = signals.reference
@@ -211,7 +195,8 @@ def _find_steps_of_reference(memory: ControllerMemory, tick: int, period: float)
         omega[k] = reference.omega_base[k] - elapsed * reference.alpha_base[k]
         turn[1 + k] = -0.25 * elapsed * (omega[k] + reference.omega_base[k])
         squared += turn[1 + k] * turn[1 + k]
-    turn[0] = 1.0 - squared * (0.5 - squared / 24.0)  # of the turn since then, to its 5th power
+    # the turn since then by the series of sine and cosine, to its 5th power
+    turn[0] = 1.0 - squared * (0.5 - squared / 24.0)
     for k in range(3):
         turn[1 + k] *= 1.0 - squared / 6.0
     error[:] = signals.attitude_error
@@ -274,6 +259,7 @@ def _observe_pair(
 def status_of(state: State, desired: Array, controls_base: bool) -> int:
     """Return `USABLE`, or the reason why a state is not usable; ``desired`` is the attitude."""
     quaternion, total = state.quaternion, 0.0
+    # one sum of all numbers instead of a test of each
     for k in range(4):
         total += quaternion[k] * quaternion[k]
     square = total
@@ -315,6 +301,7 @@ def _relative_rate(
     rate: Array,
 ) -> None:
     """Write rhodot (m,) of (22) into ``rate``; ``jacobian`` is J0 of q_e, ``omega`` scratch."""
+    # epsdot_e = J0(q_e) omega_e, omega_e = omega - R_e^T omega_d
     for k in range(3):
         omega[k] = omega_base[k] - omega_desired[k]
     rotate(jacobian, omega, rate[:3])
@@ -330,6 +317,7 @@ def _compute_errors(state: State, signals: Signals, controls_base: bool) -> None
     for k in range(3):
         signals.omega_base[k] = state.omega_base[k]
         signals.rho[k] = signals.attitude_error[1 + k]
+        # rho_d of the base is 0; a difference, since -0.0 would be another bit than 0.0 - 0.0
         error[k] = 0.0 - signals.rho[k]
         error_rate[k] = 0.0 - signals.rho_rate[k]
         signals.acceleration_desired[k] = 0.0
@@ -361,7 +349,7 @@ def copy_reference(reference: Reference, desired: Reference) -> None:
 
 @kernel
 def torque_from_force(jacobian: Array, force: Array, torque: Array) -> None:
-    """Compute ``tau = J^T F_S``: base and joint torque from the generalised force.
+    """Compute ``tau = J^T F_S`` with J of (23), the torques of base and joints.
 
     What ``torque`` has behind them, for actuators of the base, is left alone.
     """

@@ -13,7 +13,6 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator
-from enum import Enum
 
 import numpy as np
 from numpy.typing import NDArray
@@ -47,15 +46,6 @@ from .tick import (
 Array = NDArray[np.float64]
 
 
-class Mode(Enum):
-    """Mode of the controller's commands."""
-
-    NOMINAL = "nominal"
-    HOLDING = "holding"
-    SAFE = "safe"
-
-
-MODES = tuple(Mode)
 KINDS = (
     *(unusable(status, 0, np.zeros(4)).kind for status in range(SINGULAR + 1)),
     "reference held",
@@ -70,10 +60,8 @@ class Supervisor:
     def __init__(self, controller: Controller, hold_ticks: int, longest_jump: int = 2000) -> None:
         """Supervise a controller.
 
-        Args:
-            controller: which computes the commands.
-            hold_ticks: invalid states for which the last torque is held.
-            longest_jump: largest number of ticks from one state to the next.
+        ``hold_ticks``: invalid states for which the last torque is held; ``longest_jump``: largest
+        number of ticks from one state to the next.
         """
         self.controller = controller
         self.block = Supervision.block(len(controller.names.joints))
@@ -95,9 +83,9 @@ class Supervisor:
         self._code: LawCode
 
     @property
-    def mode(self) -> Mode:
-        """Mode of the last answer."""
-        return MODES[int(self._record.mode)]
+    def mode(self) -> int:
+        """Mode of the last answer, one of `MODES` by number."""
+        return int(self._record.mode)
 
     @property
     def reason(self) -> str:
@@ -145,8 +133,8 @@ class Supervisor:
                 self._law, self._code = law, law.code
             answer_state(self.block, controller.block, self._code, controller.allocate, *inputs)
         else:
-            block, estimate, needs_model = controller.block, law.estimate, law.needs_model
-            status = admit_state(self.block, block, law.h_bar, estimate, needs_model, *inputs)
+            block, (h_bar, estimate, needs_model) = controller.block, law.needs
+            status = admit_state(self.block, block, h_bar, estimate, needs_model, *inputs)
             if is_for_law(status):
                 force = force_of(law, controller.signals, tick)
                 command.torque[:] = controller.command_for(tick, force).torque

@@ -23,7 +23,7 @@ from space_robot_model.dynamics.rho_space import force_for
 from space_robot_msgs_py.compiled.kernels import RecordFunction, kernel
 from space_robot_msgs_py.compiled.lanes import uniform
 from space_robot_msgs_py.compiled.records import Block, Record, nested, shaped
-from space_robot_msgs_py.samples import MOST_THRUSTERS, MOST_TORQUERS, MOST_WHEELS, Reference
+from space_robot_msgs_py.samples import MOST_ACTUATORS, Reference
 from space_robot_msgs_py.wire.stamp_guard import accept
 
 from ..laws.base import LawCode
@@ -33,7 +33,6 @@ from .signals import (
     SINGULAR,
     USABLE,
     compute_signals,
-    compute_signals_as_desired,
     copy_reference,
     error_eta,
     torque_from_force,
@@ -43,6 +42,7 @@ from .time_delay_estimation import LONGEST_GAP
 Array = NDArray[np.float64]
 
 NOMINAL, HOLDING, SAFE = range(3)
+MODES = ("nominal", "holding", "safe")
 """The modes of commands."""
 ANSWERED, NEW, REFUSED = range(3)
 """A received state by its stamp: answered last; to be answered; not plausible."""
@@ -88,7 +88,7 @@ class Supervision(Record):
     held_since: float = shaped(lambda n: (), "Tick at which holding began")
     rejected: Array = shaped(lambda n: (STATUSES,))
     """Number of states not used, or whose reference was not, by status."""
-    command: Array = shaped(lambda n: (n + 3 + MOST_WHEELS + MOST_THRUSTERS + MOST_TORQUERS,))
+    command: Array = shaped(lambda n: (n + 3 + MOST_ACTUATORS,))
     """Answer to the last state: torque of every axis, N m, then what is asked of each of the
     base's actuators, N m and N."""
 
@@ -109,8 +109,9 @@ def controller_tick(
     If that is `USABLE`, the command is written into ``torque`` (m+A,): torque of every axis, N m,
     then what is asked of each of the base's actuators.
     """
+    copy_reference(reference[0], block[0].signals.reference)
     status: int = compute_signals(
-        block, tick, state, reference, law.h_bar, law.estimate, law.uses_model, period
+        block, tick, state, law.h_bar, law.estimate, law.uses_model, period
     )
     if status == USABLE:
         compute_command(block, law, allocate, tick, torque, period)
@@ -145,15 +146,15 @@ def engage(block: Block) -> None:
 def apply_transfer(block: Block, tick: int, force: Array, torque: Array) -> None:
     """Write the ``torque`` of a law's ``force`` (m,), which takes over from the one applied before.
 
-    ``F_S + (F_applied - F_S at the takeover) fade``, the fade falling from 1 to 0. At tick 0
-    nothing has been applied, so nothing is taken over. A base that is not controlled gets none.
-    The base's part is what its actuators are asked for.
+    The fade falls from 1 to 0. At tick 0 nothing has been applied, so nothing is taken over. A base
+    that is not controlled gets none. The base's part is the demand on its actuators.
     """
     memory = block[0]
     if uniform(memory.transfer_left) < 0.0:
         memory.transfer_left = uniform(memory.transfer_ticks) if tick > 0 else 0.0
         for i in range(force.size):
             memory.transfer[i] = memory.signals.applied_force[i] - force[i]
+    # F_S + (F_applied - F_S at the takeover) fade
     fade = uniform(memory.transfer_left) / uniform(memory.transfer_ticks)
     for i in range(force.size):
         memory.force[i] = force[i]
@@ -248,12 +249,11 @@ def admit_state(
     quaternion = state[0].quaternion
     status_with_reference: int = take_reference(block[0], reference[0], quaternion, desired)
     least = NOMINAL_FROM_ETA if block[0].mode == SAFE else SAFE_BELOW_ETA
+    # hysteresis: from safe mode back only when the error is clearly smaller
     is_near = abs(error_eta(desired.quaternion, quaternion)) < least
     if is_near and is_unit(quaternion) and controller[0].controls_base == 1.0:
         return SINGULAR
-    status: int = compute_signals_as_desired(
-        controller, tick, state, h_bar, estimate, uses_model, period
-    )
+    status: int = compute_signals(controller, tick, state, h_bar, estimate, uses_model, period)
     return status_with_reference if status == USABLE else status
 
 
@@ -282,6 +282,7 @@ def take_reference(
         copy_reference(reference, desired)
         supervision.has_reference = 1.0
         return USABLE
+    # rest where it was: with its last velocity it would drift away
     desired.joint_velocities[:] = desired.joint_accelerations[:] = 0.0
     desired.omega_base[:] = desired.alpha_base[:] = 0.0
     if supervision.has_reference == 1.0:
@@ -319,6 +320,7 @@ def conclude(block: Block, tick: int, status: int) -> None:
         supervision.mode = NOMINAL
         return
     command = supervision.command
+    # how long a pulse is to be is not known: valves are closed, the other torques are held
     if supervision.mode == NOMINAL:
         supervision.mode = HOLDING
         supervision.held_since = tick

@@ -61,6 +61,7 @@ def observe(
     for i in range(rate.size):
         force, acceleration = applied_force[i], acceleration_desired[i]
         if known:
+            # mean rhodd of the interval over which the plant held `applied_force`
             acceleration = (rate[i] - pair.rate[i]) / (elapsed * period)
         if any_lane(weight < 1.0):
             smooth_force = pair.applied_force[i] + weight * (force - pair.applied_force[i])
@@ -76,7 +77,8 @@ def observe(
 
 @kernel
 def time_delay_estimate(pair: TimeDelayPair, h_bar: Array, n_hat: Array) -> None:
-    """Compute the estimate (36) for a constant diagonal inertia ``h_bar`` (m,)."""
+    """Compute the estimate (35), (36) for a constant diagonal inertia ``h_bar`` (m,)."""
+    # N_hat = F(t - delta) - h_bar rhodd(t - delta)
     for i in range(n_hat.size):
         n_hat[i] = pair.applied_force[i] - h_bar[i] * pair.acceleration[i]
 

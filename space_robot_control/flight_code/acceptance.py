@@ -17,10 +17,10 @@ from space_robot_msgs_py.compiled.records import Block
 from space_robot_msgs_py.samples import Command, Reference, RobotState
 
 from ..controller.controller import Controller
-from ..controller.supervisor import MODES, Supervisor
+from ..controller.supervisor import Supervisor
 from ..controller.tick import ANSWERED, NEW
 from .folder import Exported
-from .library import fill_measurement, fill_reference
+from .instances import fill_measurement, fill_reference
 
 Array = NDArray[np.float64]
 
@@ -38,12 +38,15 @@ SHARE, REFERENCE_SHARE = 0.3, 0.1
 """Shares of the states, and of their references, that are hostile."""
 
 
-class AnswerRecording:
-    """Requests to the flight software and its answers, in the format of ``acceptance.c``."""
+class RecordingSupervisor(Supervisor):
+    """Supervisor that records its requests and answers, in the format of ``acceptance.c``."""
 
-    def __init__(self, exported: Exported) -> None:
-        """Begin without any."""
-        self.dtype = np.dtype(
+    def __init__(
+        self, controller: Controller, exported: Exported, hold_ticks: int, longest_jump: int
+    ) -> None:
+        """Supervise ``controller`` as any supervisor, for exported flight software."""
+        super().__init__(controller, hold_ticks, longest_jump)
+        self._dtype = np.dtype(
             [
                 ("kind", np.int64),
                 ("measurement", exported.measurement_type),
@@ -54,25 +57,21 @@ class AnswerRecording:
                 ("command", exported.command_type),
             ]
         )
-        self._parts: list[bytes] = []
+        self.records: list[bytes] = []
+        self._judged = -1
+        """Tick that was judged to be new and is not answered yet; -1: none."""
 
-    def __len__(self) -> int:
-        """Number of records."""
-        return len(self._parts)
-
-    def add(
+    def _add(
         self,
         kind: int,
         result: int,
-        supervisor: Supervisor,
         state: RobotState | int,
         reference: Block | None = None,
         command: Command | None = None,
     ) -> None:
-        """Add a request, for a state or only its tick, and its answer."""
-        record: NDArray[Any] = np.zeros(1, self.dtype)
+        record: NDArray[Any] = np.zeros(1, self._dtype)
         record["kind"], record["result"] = kind, result
-        record["mode"] = MODES.index(supervisor.mode)
+        record["mode"] = self.mode
         if isinstance(state, RobotState):
             fill_measurement(record["measurement"], state)
         else:
@@ -82,71 +81,62 @@ class AnswerRecording:
         if command is not None:
             record["command"]["tick"] = command.tick
             record["command"]["command"] = command.torque
-            record["telemetry"] = sum_of(supervisor.telemetry())
-        self._parts.append(record.tobytes())
+            record["telemetry"] = weighted_sum(self.telemetry())
+        self.records.append(record.tobytes())
 
-    def write(self, path: Path) -> None:
-        """Write the records to a file."""
-        head = np.array([MAGIC, self.dtype.itemsize, len(self._parts)], np.int64)
-        path.write_bytes(b"".join([head.tobytes(), *self._parts]))
-
-
-def sum_of(telemetry: tuple[Array, ...]) -> np.uint64:
-    """Return a sum over the bits of numbers, each with another weight; NaN counts as zero."""
-    numbers = np.concatenate(telemetry)
-    numbers[np.isnan(numbers)] = 0.0
-    weights = np.arange(1, numbers.size + 1, dtype=np.uint64)
-    total: np.uint64 = (numbers.view(np.uint64) * weights).sum(dtype=np.uint64)
-    return total
-
-
-class RecordingSupervisor(Supervisor):
-    """Supervisor that records all requests and answers."""
-
-    def __init__(
-        self, controller: Controller, recording: AnswerRecording, hold_ticks: int, longest_jump: int
-    ) -> None:
-        """Supervise ``controller`` as any supervisor, into ``recording``."""
-        super().__init__(controller, hold_ticks, longest_jump)
-        self._recording = recording
-        self._judged = -1
-        """Tick that was judged to be new and is not answered yet; -1: none."""
+    def choose(self, place: int) -> None:
+        """Record that the law of a place in the exported ones is chosen."""
+        self._add(CHOOSE, place, 0)
 
     def judge_stamp(self, tick: int) -> int:
-        """Return the standing of a state by its stamp."""
+        """Return the status of a state's stamp."""
         self.finish()
-        standing = super().judge_stamp(tick)
-        if standing == NEW:
+        status = super().judge_stamp(tick)
+        if status == NEW:
             self._judged = tick
-            return standing
-        is_known = standing == ANSWERED
+            return status
+        is_known = status == ANSWERED
         result = int(self._record.reason) if is_known else REFUSED
-        command = Command(tick, self._command.torque) if is_known else None
-        self._recording.add(STEP, result, self, tick, None, command)
-        return standing
+        self._add(
+            STEP, result, tick, None, Command(tick, self._command.torque) if is_known else None
+        )
+        return status
 
     def answer(self, state: RobotState, reference: Block) -> Command:
         """Return the command for a state."""
         command = super().answer(state, reference)
         self._judged = -1
-        result = int(self._record.reason)
-        self._recording.add(STEP, result, self, state, reference, command)
+        self._add(STEP, int(self._record.reason), state, reference, command)
         return command
 
     def finish(self) -> None:
         """Record a state that was judged and not answered, if the last one was."""
         if self._judged >= 0:
-            self._recording.add(JUDGE, NEW, self, self._judged)
+            self._add(JUDGE, NEW, self._judged)
             self._judged = -1
 
+    def write(self, path: Path) -> None:
+        """Write the records to a file."""
+        head = np.array([MAGIC, self._dtype.itemsize, len(self.records)], np.int64)
+        path.write_bytes(b"".join([head.tobytes(), *self.records]))
 
-def shake(state: RobotState, size: float, random: np.random.Generator) -> None:
+
+def weighted_sum(telemetry: tuple[Array, ...]) -> np.uint64:
+    """Return a sum over the bits of numbers, each with another weight; NaN counts as zero."""
+    numbers = np.concatenate(telemetry)
+    numbers[np.isnan(numbers)] = 0.0  # processors make different ones
+    weights = np.arange(1, numbers.size + 1, dtype=np.uint64)
+    total: np.uint64 = (numbers.view(np.uint64) * weights).sum(dtype=np.uint64)
+    return total
+
+
+def disturb_state(state: RobotState, size: float, random: np.random.Generator) -> None:
     """Add noise of a ``size`` to all numbers of a state; its quaternion stays unit."""
     state.numbers[:] += size * random.normal(size=state.numbers.size)
     state.quaternion[:] /= np.sqrt(state.quaternion @ state.quaternion)
 
 
-def spoil(
+def corrupt_state(
     state: RobotState,
     wheels: int,
     random: np.random.Generator,
@@ -180,14 +170,14 @@ def spoil(
     state.wheel_velocities[wheels:] = state.wheel_torques[wheels:] = 0.0
 
 
-def spoiled_reference(reference: Block, random: np.random.Generator) -> Block:
+def corrupted_reference(reference: Block, random: np.random.Generator) -> Block:
     """Return a reference with some, or all, of its numbers changed."""
-    spoiled = reference.copy()
-    for part in Reference.parts(spoiled):
+    corrupted = reference.copy()
+    for part in Reference.parts(corrupted):
         numbers = part.reshape(-1)
         places = random.integers(numbers.size, size=random.choice([0, 1, 3, numbers.size]))
         numbers[places] = random.choice(VALUES, size=places.size)
-    return spoiled
+    return corrupted
 
 
 def hostile_ticks(count: int, random: np.random.Generator) -> Iterator[int]:

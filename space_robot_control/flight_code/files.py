@@ -34,6 +34,7 @@ def wrapped(line: str) -> str:
     if len(line) <= WIDTH:
         return line
     indent = line[: len(line) - len(line.lstrip())]
+    # a type stays with its name
     bound = re.sub(r"(const|static|return|\w+_\w+|double) (?=[*\w])", "\\1\0", line.strip())
     parts = textwrap.wrap(
         bound,
@@ -46,20 +47,21 @@ def wrapped(line: str) -> str:
 
 
 def descriptions(record: type[Record]) -> dict[str, str]:
-    """Return what is said about each field of a record, in its class and in those above."""
-    said: dict[str, str] = {}
+    """Return the texts on the fields of a record, from its class and those above."""
+    texts: dict[str, str] = {}
     for owner in reversed(record.__mro__):
         if not issubclass(owner, Record) or owner is Record:
             continue
+        # Python keeps no text that stands below an attribute, but its source has it
         tree: Any = ast.parse(textwrap.dedent(inspect.getsource(owner))).body[0]
         for this, after in zip(tree.body, [*tree.body[1:], None], strict=True):
             is_said = isinstance(after, ast.Expr) and isinstance(after.value, ast.Constant)
             if isinstance(this, ast.AnnAssign) and isinstance(this.target, ast.Name) and is_said:
-                said[this.target.id] = str(after.value.value)
+                texts[this.target.id] = str(after.value.value)
         for name, field in owner.fields().items():
             if isinstance(field, RecordField) and field.description:
-                said.setdefault(name, f"{field.description}.")
-    return said
+                texts.setdefault(name, f"{field.description}.")
+    return texts
 
 
 def reachable(program: KernelProgram, first: Iterable[Function]) -> list[Function]:
@@ -119,9 +121,8 @@ class Files:
         declared = record.fields()[name]
         if not isinstance(declared, RecordField):
             return any(self.has(declared, inner) for inner in declared.fields())
-        return lang.FieldName(record, name) in self.fields and 0 not in self.program.shape(
-            record, name
-        )
+        is_empty = 0 in self.program.shape(record, name)  # C has no such arrays
+        return lang.FieldName(record, name) in self.fields and not is_empty
 
     def name_of(self, function: Function) -> str:
         """Return a function's name in C."""
@@ -139,13 +140,13 @@ class Files:
 
     def struct(self, record: type[Record]) -> str:
         """Return the definition of a record's struct, without those of its nested records."""
-        said = descriptions(record)
+        texts = descriptions(record)
         text = comment(inspect.getdoc(record) or record.__name__)
         text += "typedef struct {\n"
         for name, field in record.fields().items():
             if not self.has(record, name):
                 continue
-            text += comment(said[name], "    ") if name in said else ""
+            text += comment(texts[name], "    ") if name in texts else ""
             if isinstance(field, RecordField):
                 sizes = "".join(f"[{size}]" for size in self.program.shape(record, name))
                 text += f"    double {name}{sizes};\n"
@@ -217,9 +218,9 @@ class Files:
 
     def _definition(self, function: Function) -> str:
         tree, file = syntax_of(function.body)
-        said = ast.get_docstring(tree) or tree.name
+        about = ast.get_docstring(tree) or tree.name
         line = function.body.__code__.co_firstlineno
-        text = comment(f"{said}\n\nPython: {tree.name}, {file}, line {line}.")
+        text = comment(f"{about}\n\nPython: {tree.name}, {file}, line {line}.")
         target = self.program.target
         before = target.local_function if self._is_local(function) else target.shared_function
         text += wrapped(f"{before}{self.prototype(function)}")
@@ -232,26 +233,19 @@ class Files:
         return number not in self._roots and self._calling_rooms[number] == {home}
 
     def _function_names(self) -> dict[int, str]:
-        bare = {f: f.body.__name__.lstrip("_") for f in self.functions}
         names: dict[int, str] = {}
-        taken: set[str] = set()
         for function in self.functions:
-            alike = [f for f in self.functions if bare[f] == bare[function]]
-            name = bare[function]
+            name = function.body.__name__.lstrip("_")
+            alike = [f for f in self.functions if f.body.__name__.lstrip("_") == name]
             if len({f.body for f in alike}) > 1:
                 name = f"{function.body.__module__.rpartition('.')[2]}_{name}"
-            if (
-                len(alike) > 1
-                and function.label
-                and sum(f.body is function.body for f in alike) > 1
-            ):
+            if function.label and sum(f.body is function.body for f in alike) > 1:
                 name = f"{name}_{function.label}"
-            fresh, count = name, 1
-            while fresh in taken:
+            fresh, count = f"{lang.PREFIX}{name}", 1
+            while fresh in names.values():
                 count += 1
-                fresh = f"{name}_{count}"
-            taken.add(fresh)
-            names[self.program.functions.index(function)] = f"{lang.PREFIX}{fresh}"
+                fresh = f"{lang.PREFIX}{name}_{count}"
+            names[self.program.functions.index(function)] = fresh
         return names
 
     def _constant_names(self) -> dict[int, str]:

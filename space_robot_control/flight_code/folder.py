@@ -37,13 +37,12 @@ class Exported:
             software: what flies.
             robot: name of the robot, for comments.
             scenario: text whose digest names the scenario; empty: the parameters themselves.
-
-        Raises:
-            InputError: something has no translation to C.
         """
         self.translated: Translated = translate(software)
         self.software, self.robot = software, robot
-        self._entries = list(entries(self.translated))
+        self._entries = [
+            entry for part in software.parts for entry in entries(self.translated, part)
+        ]
         text = scenario or "".join(entry.definition for entry in self._entries)
         self.digest = hashlib.sha256(text.encode()).hexdigest()
         self._templates = jinja2.Environment(
@@ -86,11 +85,6 @@ class Exported:
         """Memory layout of ``space_robot_command``."""
         count = len(self.software.controller.names.commanded)
         return np.dtype([("tick", np.int64), ("command", np.float64, (count,))])
-
-    @property
-    def rooms(self) -> list[str]:
-        """Names of the files of C in ``src``."""
-        return sorted(path.name for path in self.sources if path.suffix == ".c")
 
     def render(self, template: str, **content: Any) -> str:
         """Return a file made from a template."""
@@ -155,7 +149,7 @@ class Exported:
                         for field in gains.record.fields().values()
                         if isinstance(field, RecordField)
                     ),
-                    "reset": reset_lines(self.translated, memory),
+                    "reset": [entry.assignment for entry in entries(self.translated, memory)],
                     "answer": roots[f"answer_state {law.name}"],
                     "arguments": self._arguments(law.name),
                 }
@@ -190,57 +184,46 @@ class Exported:
 class Entry(NamedTuple):
     """A number, or an array of numbers, of the state struct."""
 
-    path: str
-    """In the state struct."""
     definition: str
     """In ``parameters.h``."""
     assignment: str
     """In `space_robot_init`."""
 
 
-def entries(translated: Translated) -> Iterator[Entry]:
-    """Return all numbers that are not zero before the first tick."""
-    for part in translated.software.parts:
-        path = part.name
-        source = f" Source: {part.source}." if part.source else ""
-        yield from _entries(translated, part.record, part.numbers, path, source)
-
-
-def reset_lines(translated: Translated, part: Part) -> list[str]:
-    """Return the assignments that a law's memory needs after it has been cleared."""
-    inner = _entries(translated, part.record, part.numbers, part.name, "")
-    return [entry.assignment for entry in inner]
+def entries(translated: Translated, part: Part) -> Iterator[Entry]:
+    """Return all numbers of a part that are not zero before the first tick."""
+    source = f" Source: {part.source}." if part.source else ""
+    yield from _entries(translated, part.record, part.numbers, part.name, source)
 
 
 def _entries(
     translated: Translated, record: type[Record], numbers: Any, path: str, source: str
 ) -> Iterator[Entry]:
-    said = descriptions(record)
+    texts = descriptions(record)
     for name, kind in translated.kept(record):
         inside = f"{path}.{name}"
         if not isinstance(kind, tuple):
             yield from _entries(translated, kind, numbers[name], inside, source)
             continue
         kept = numbers_of(kind, numbers[name])
+        # by bits: -0.0 is not zero
         is_table = lang.FieldName(record, name) in translated.tables
         if is_table or not np.any(kept.view(np.int64)):
             continue
         constant = f"SR_{inside.replace('.', '_').upper()}"
-        about = comment(f"{inside}: {said.get(name, 'see its struct.')}{source}")
+        about = comment(f"{inside}: {texts.get(name, 'see its struct.')}{source}")
         if not kind:
-            text = literal(float(kept))
-            yield Entry(
-                inside, f"{about}#define {constant} ({text})\n", f"state->{inside} = {constant};"
-            )
+            define = f"{about}#define {constant} ({literal(float(kept))})\n"
+            yield Entry(define, f"state->{inside} = {constant};")
             continue
         flat, target = kept.reshape(-1), f"state->{inside}"
         if np.all(flat == flat[0]) or np.all(np.isnan(flat)):
             define = f"#define {constant} ({literal(float(flat[0]))})\n"
-            yield Entry(inside, about + define, _by_rows("fill", target, constant, kind))
+            yield Entry(about + define, _by_rows("fill", target, constant, kind))
             continue
         values = wrapped("    " + ", ".join(literal(float(value)) for value in flat))
         table = f"static const double {constant}[{flat.size}] = {{\n{values}\n}};\n"
-        yield Entry(inside, about + table, _by_rows("copy", target, constant, kind))
+        yield Entry(about + table, _by_rows("copy", target, constant, kind))
 
 
 def _by_rows(function: str, target: str, source: str, shape: tuple[int, ...]) -> str:

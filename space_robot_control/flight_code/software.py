@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, NamedTuple
@@ -51,30 +51,17 @@ class Part(NamedTuple):
     """Where they come from, in words."""
 
 
-@dataclass(frozen=True)
 class FlightSoftware:
     """Controller, laws and swaps of a flight, as they are before its first tick."""
 
-    controller: Controller
-    """With the law in force at the start."""
-    laws: Sequence[CompiledLaw]
-    """That law first, then all to which it can be swapped."""
-    swaps: Sequence[tuple[int, int]]
-    """Ticks, increasing, and the place in ``laws`` of the law from each on."""
-    hold_ticks: int
-    longest_jump: int
-    sources: dict[str, str]
-    """Where numbers come from, by name of the part: ``controller``, or a law's name."""
-
-    @classmethod
-    def of(
-        cls,
+    def __init__(
+        self,
         controller: Controller,
         laws: Sequence[ControlLaw],
         swaps: Sequence[tuple[int, ControlLaw]],
         supervision: tuple[int, int],
-        sources: dict[str, str],
-    ) -> FlightSoftware:
+        sources: Mapping[str, str],
+    ) -> None:
         """Collect the flight software.
 
         Args:
@@ -82,12 +69,13 @@ class FlightSoftware:
             laws: all laws that may be in force, that one first.
             swaps: ticks, increasing, and the law from each on.
             supervision: ``hold_ticks`` and ``longest_jump``.
-            sources: see `FlightSoftware`.
+            sources: where numbers come from, by name of the part: ``controller``, or a law's name.
 
         Raises:
             InputError: a law has no kernel.
         """
-        compiled: list[CompiledLaw] = []
+        self.controller, self.laws = controller, list[CompiledLaw]()
+        self._supervision, self._sources = supervision, sources
         for law in laws:
             if not isinstance(law, CompiledLaw):
                 code = type(law).force.__code__
@@ -96,11 +84,11 @@ class FlightSoftware:
                     "Python function and cannot be exported as C: write its equation as the "
                     "`kernel` of a CompiledLaw"
                 )
-            compiled.append(law)
-        places = [
+            self.laws.append(law)
+        self.swaps = [
             (tick, next(k for k, one in enumerate(laws) if one is law)) for tick, law in swaps
         ]
-        return cls(controller, compiled, places, *supervision, sources)
+        """Ticks, and the place in ``laws`` of the law from each on."""
 
     @property
     def joints(self) -> int:
@@ -120,28 +108,26 @@ class FlightSoftware:
             "MOST_PAIRS": wheels * (wheels - 1) // 2,
             "MOST_THRUSTERS": len(names.thrusters),
             "MOST_TORQUERS": len(names.torquers),
+            "MOST_ACTUATORS": len(names.actuators),
             "RING": ring,
         }
 
     @cached_property
     def parts(self) -> list[Part]:
         """Records of the state struct in order."""
-        supervisor = Supervisor(self.controller, self.hold_ticks, self.longest_jump)
+        supervisor, source = Supervisor(self.controller, *self._supervision), self._sources.get
         self.controller.engage()
         parts = [
-            Part("supervision", Supervision, supervisor.block[0], self._source("controller")),
-            Part("controller", ControllerMemory, self.controller.block[0], self._source("robot")),
+            Part("supervision", Supervision, supervisor.block[0], source("controller", "")),
+            Part("controller", ControllerMemory, self.controller.block[0], source("robot", "")),
         ]
         for law in self.laws:
             law.reset()
-            own = type(law)
-            source = self._source(law.name)
-            parts.append(Part(f"{law.name}_gains", own.gains_type, law.gains_block[0], source))
-            parts.append(Part(f"{law.name}_memory", own.memory_type, law.memory_block[0], ""))
+            gains, memory = law.gains_block[0], law.memory_block[0]
+            origin = source(law.name, "")
+            parts.append(Part(f"{law.name}_gains", type(law).gains_type, gains, origin))
+            parts.append(Part(f"{law.name}_memory", type(law).memory_type, memory, ""))
         return parts
-
-    def _source(self, name: str) -> str:
-        return self.sources.get(name, "")
 
 
 @dataclass(frozen=True)
@@ -175,9 +161,6 @@ def translate(software: FlightSoftware) -> Translated:
 
     Every translation tells which numbers no kernel writes. In the next one they are known, so
     branches that they decide for good are left out, and what is written only there.
-
-    Raises:
-        InputError: a kernel has no translation; names file, line and what to write instead.
     """
     constants: dict[lang.FieldName, float] | None = None
     known: dict[lang.FieldName, float] = {}
@@ -187,6 +170,7 @@ def translate(software: FlightSoftware) -> Translated:
         reached = reachable(program, roots.values())
         written = {field for function in reached for field in function.stores}
         known = _constants(software, program, written)
+    # what a user fills, and gains and memories of laws, have all their fields
     whole: list[type[Record]] = [State, Reference]
     whole += [part.record for part in software.parts if "_" in part.name]
     files = Files(program, list(roots.values()), whole, _room)
@@ -258,9 +242,9 @@ def _constants(
         for name, field in record.fields().items():
             if isinstance(field, RecordField):
                 kept = numbers_of(program.shape(record, name), numbers[name])
-                numbers_of_field.setdefault(lang.FieldName(record, name), set()).add(
-                    same_number(kept)
-                )
+                is_one = kept.size > 0 and np.all(kept == kept.flat[0])
+                values = numbers_of_field.setdefault(lang.FieldName(record, name), set())
+                values.add(float(kept.flat[0]) if is_one else None)
             else:
                 visit(field, numbers[name])
 
@@ -277,13 +261,6 @@ def numbers_of(shape: tuple[int, ...], numbers: Any) -> NDArray[np.float64]:
     """Return the part of a field's numbers that a shape keeps."""
     array: NDArray[np.float64] = np.asarray(numbers, dtype=np.float64)
     return array[tuple(slice(0, size) for size in shape)]
-
-
-def same_number(numbers: NDArray[np.float64]) -> float | None:
-    """Return the number that all numbers of an array are; None if they differ."""
-    if numbers.size and np.all(numbers == numbers.flat[0]):
-        return float(numbers.flat[0])
-    return None
 
 
 def _room(module: str) -> str:

@@ -19,7 +19,7 @@ from ..controller.supervisor import Supervisor
 from ..laws import ControlLaw
 
 if TYPE_CHECKING:
-    from .library import FlightCode
+    from .instances import FlightCode
 
 Array = NDArray[np.float64]
 TELEMETRY = ("s", "u", "N_hat", "e")
@@ -43,7 +43,7 @@ class _SupervisorWithCode(Supervisor):
 
     def deactivate(self, tick: int) -> Command:
         """Return the zero-torque command that ends a flight."""
-        self._flight_code.stand_down(tick)
+        self._flight_code.deactivate(tick)
         return super().deactivate(tick)
 
 
@@ -54,10 +54,10 @@ class CodeSupervisor(_SupervisorWithCode):
     """
 
     def judge_stamp(self, tick: int) -> int:
-        """Return the standing of a state by its stamp."""
-        standing = self._flight_code.judge_stamp(tick)
+        """Return the status of a state's stamp."""
+        status = self._flight_code.judge_stamp(tick)
         self._flight_code.write_condition(self._record)
-        return standing
+        return status
 
     def answer(self, state: RobotState, reference: Block) -> Command:
         """Return the command for a state."""
@@ -69,7 +69,8 @@ class CodeSupervisor(_SupervisorWithCode):
 
     def telemetry(self) -> tuple[Array, Array, Array, Array]:
         """Telemetry of the last tick."""
-        return self._flight_code.telemetry
+        s, u, n_hat, error = self._flight_code.telemetry
+        return s, u, n_hat, error
 
     @property
     def diagnosis(self) -> Diagnosis:
@@ -81,22 +82,14 @@ class ShadowSupervisor(_SupervisorWithCode):
     """Supervisor that compares every answer of the kernels with that of the flight code in C."""
 
     def judge_stamp(self, tick: int) -> int:
-        """Return the standing of a state by its stamp.
-
-        Raises:
-            ShadowError: C judges differently.
-        """
-        standing, other = super().judge_stamp(tick), self._flight_code.judge_stamp(tick)
-        if standing != other:
-            raise ShadowError(f"at tick {tick} Python judges the stamp as {standing}, C as {other}")
-        return standing
+        """Return the status of a state's stamp, or raise a `ShadowError`."""
+        status, other = super().judge_stamp(tick), self._flight_code.judge_stamp(tick)
+        if status != other:
+            raise ShadowError(f"at tick {tick} Python judges the stamp as {status}, C as {other}")
+        return status
 
     def answer(self, state: RobotState, reference: Block) -> Command:
-        """Return the command for a state.
-
-        Raises:
-            ShadowError: C answers differently; names the first number that differs.
-        """
+        """Return the command for a state, or raise a `ShadowError`."""
         command, code = super().answer(state, reference), self._flight_code
         names = self.controller.names
         code.answer(state, reference)
@@ -106,12 +99,12 @@ class ShadowSupervisor(_SupervisorWithCode):
         return command
 
     @staticmethod
-    def _compare(tick: int, what: str, names: Sequence[str], python: Array, c: Array) -> None:
+    def _compare(tick: int, number: str, names: Sequence[str], python: Array, c: Array) -> None:
         different = np.flatnonzero(bits(python) != bits(c))
         if different.size:
             k = int(different[0])
             values = f"{float(python[k])!r} in Python and {float(c[k])!r} in C"
-            raise ShadowError(f"at tick {tick} the {what} {names[k]} is {values}")
+            raise ShadowError(f"at tick {tick} the {number} {names[k]} is {values}")
 
 
 def bits(numbers: Array) -> NDArray[np.int64]:
@@ -126,13 +119,7 @@ def supervisor_of(
 ) -> Supervisor:
     """Return the supervisor that the settings ask for.
 
-    Args:
-        controller: with the law in force at the start.
-        laws: all laws that it may be given, that one first.
-        settings: of the controller's node.
-
-    Raises:
-        InputError: a law cannot be exported, or there is no compiler or no flight computer.
+    ``laws`` are all laws that the controller may be given, that at the start first.
     """
     limits = settings.hold_ticks, settings.longest_jump
     if settings.answers_in_python:
@@ -144,11 +131,10 @@ def supervisor_of(
         )
     # most flights need no translator
     from .folder import Exported
-    from .library import FlightLibrary
-    from .remote import FlightComputer
+    from .instances import FlightComputer, FlightLibrary
     from .software import FlightSoftware
 
-    exported = Exported(FlightSoftware.of(controller, laws, [], limits, {}), settings.robot)
+    exported = Exported(FlightSoftware(controller, laws, [], limits, {}), settings.robot)
     if settings.controller_code.startswith("udp:"):
         _, host, port = settings.controller_code.split(":")
         return CodeSupervisor(controller, settings, FlightComputer(exported, host, int(port)))

@@ -2,6 +2,9 @@
 
 Each gives position, rate and acceleration that belong together at any time. Before it begins and
 after it ends it is at rest, unless the base turns on.
+
+Times are in s, joints in rad, or m of prismatic ones. The base's attitude is a unit quaternion
+``[w, x, y, z]``; its angular velocity and acceleration are on its own axes.
 """
 
 from __future__ import annotations
@@ -43,13 +46,11 @@ class Piece(NamedTuple):
     """A planned segment."""
 
     begin: float
-    """s."""
     end: float
-    """s."""
     joints: Course
     base: Course
     goal: Array
-    """(n,) joints at the end, rad, or m of prismatic joints."""
+    """(n,) joints at the end."""
     attitude: Array
     """(4,) quaternion at the end."""
     motion: str = "joints"
@@ -82,9 +83,8 @@ class SegmentStart(NamedTuple):
     robot: Robot
     """As the flight software knows it."""
     time: float
-    """s."""
     joints: Array
-    """(n,) rad, or m of prismatic joints."""
+    """(n,)"""
     base: BaseMotion
     origin: Callable[[], Array]
     """Returns the origin (3,) of the inertial frame from the robot's centre of mass, m."""
@@ -93,9 +93,9 @@ class SegmentStart(NamedTuple):
 
 
 Maker = Callable[[float], tuple[Course, Course]]
-"""Makes the courses of joints and base of a segment of a duration in s."""
+"""Courses of joints and base as a function of a segment's duration, s."""
 JointMaker = Callable[[float, Course], Course]
-"""Makes the course of the joints in a duration in s, while the base moves along a course."""
+"""Course of the joints as a function of the duration, s, and the course of the base."""
 
 
 def quintic(u: Array) -> tuple[Array, Array, Array]:
@@ -126,16 +126,14 @@ class QuinticLeg(NamedTuple):
     """Joints from rest to rest: ``theta_a + (theta_b - theta_a)(10 u^3 - 15 u^4 + 6 u^5)``."""
 
     begin: float
-    """s."""
     span: float
-    """s, above 0."""
     start: Array
-    """(n,) rad, or m of prismatic joints."""
+    """(n,)"""
     rise: Array
     """(n,) goal minus start."""
 
     def at(self, time: Array) -> Array:
-        """Return (T, 3, n) at times (T,), s."""
+        """Return (T, 3, n) at times (T,)."""
         share, rate, acceleration = quintic(
             np.clip((time - self.begin)[:, np.newaxis] / self.span, 0.0, 1.0)
         )
@@ -153,18 +151,16 @@ class BentLeg(NamedTuple):
     """
 
     begin: float
-    """s."""
     span: float
-    """s, above 0."""
     start: Array
-    """(n,) rad, or m of prismatic joints."""
+    """(n,)"""
     rise: Array
     """(n,) goal minus start."""
     bends: Array
     """(K, n) amplitudes, rad or m."""
 
     def at(self, time: Array) -> Array:
-        """Return (T, 3, n) at times (T,), s."""
+        """Return (T, 3, n) at times (T,)."""
         from space_robot_model.elementary.functions import sines_cosines  # slow to import
 
         u = np.clip((time - self.begin)[:, np.newaxis] / self.span, 0.0, 1.0)
@@ -188,21 +184,19 @@ class Slew(NamedTuple):
     """The base turns about one axis from rest to rest; the angle is quintic."""
 
     begin: float
-    """s."""
     span: float
-    """s, above 0."""
     quaternion: Array
-    """(4,) attitude at the begin, unit."""
+    """(4,) at the begin."""
     axis: Array
     """(3,) unit, in the base frame; its components do not change during the turn."""
     angle: float
     """rad."""
 
     def at(self, time: Array) -> Array:
-        """Return (T, 10) at times (T,), s: quaternion, velocity and acceleration, base frame."""
+        """Return (T, 10) at times (T,): quaternion, angular velocity and acceleration."""
         rows = np.zeros((len(time), 10))
         rows[:, :4] = self.quaternion
-        if self.angle == 0.0:
+        if self.angle == 0.0:  # most missions hold the base: no import for them
             return rows
         share, rate, acceleration = quintic(np.clip((time - self.begin) / self.span, 0.0, 1.0))
         rows[:, :4] = multiplied(self.quaternion, turned_by(self.axis, self.angle * share))
@@ -215,14 +209,13 @@ class SteadyTurn(NamedTuple):
     """The base turns about one axis at a constant rate."""
 
     begin: float
-    """s."""
     quaternion: Array
-    """(4,) attitude at the begin, unit."""
+    """(4,) at the begin."""
     omega: Array
     """(3,) angular velocity, rad/s, base frame."""
 
     def at(self, time: Array) -> Array:
-        """Return (T, 10) at times (T,), s: quaternion, velocity and acceleration, base frame."""
+        """Return (T, 10) at times (T,): quaternion, angular velocity and acceleration."""
         rows, rate = np.zeros((len(time), 10)), norm(self.omega)
         rows[:, :4], rows[:, 4:7] = self.quaternion, self.omega
         if rate:
@@ -239,7 +232,7 @@ class SplineCourse(NamedTuple):
     spline: CubicSpline | QuinticSpline
 
     def at(self, time: Array) -> Array:
-        """Return (T, 3, n) at times (T,), s."""
+        """Return (T, 3, n) at times (T,)."""
         return self.spline.at(time - self.begin)
 
 
@@ -247,18 +240,17 @@ class BrakedTurn(NamedTuple):
     """The base comes to rest about the axis that it turns about."""
 
     begin: float
-    """s."""
     span: float
     """s until it is at rest."""
     quaternion: Array
-    """(4,) attitude at the begin, unit."""
+    """(4,) at the begin."""
     omega: Array
     """(3,) angular velocity at the begin, rad/s, base frame."""
     alpha: Array
     """(3,) angular acceleration at the begin; its part along ``omega`` goes on."""
 
     def at(self, time: Array) -> Array:
-        """Return (T, 10) at times (T,), s: quaternion, velocity and acceleration, base frame."""
+        """Return (T, 10) at times (T,): quaternion, angular velocity and acceleration."""
         from space_robot_model.elementary.splines import QuinticSpline
 
         rate = norm(self.omega)
@@ -283,7 +275,7 @@ class AttitudeCourse(NamedTuple):
     """Of quaternions in one hemisphere."""
 
     def at(self, time: Array) -> Array:
-        """Return (T, 10) at times (T,), s: quaternion, velocity and acceleration, base frame."""
+        """Return (T, 10) at times (T,): quaternion, angular velocity and acceleration."""
         p, p_rate, p_second = np.moveaxis(self.spline.at(time - self.begin), 1, 0)
         length = np.sqrt(dot_rows(p, p))
         q = p / length
@@ -332,7 +324,7 @@ def turn_between(first: Array, second: Array) -> tuple[Array, float]:
     from space_robot_model.elementary.functions import arctan2  # slow to import
 
     turn = multiplied(first * np.array([1.0, -1.0, -1.0, -1.0]), second)
-    turn = -turn if turn[0] < 0.0 else turn
+    turn = -turn if turn[0] < 0.0 else turn  # the other sign is the same attitude the longer way
     sine = norm(turn[1:])
     if sine == 0.0:
         return np.array([1.0, 0.0, 0.0]), 0.0

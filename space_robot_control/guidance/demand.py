@@ -68,13 +68,7 @@ def demand(
 ) -> MotionDemand:
     """Sample a motion and compute what it asks of a robot whose joints are all actuated.
 
-    Args:
-        robot: the robot.
-        joints: of the motion.
-        base: of the motion.
-        begin: s.
-        end: s.
-        samples: number of samples; 0: see `sample_times`.
+    Without a number of samples they are at `sample_times`.
     """
     time = np.linspace(begin, end, samples) if samples else sample_times(begin, end)
     chunk = ReferenceChunk(0, joints.at(time), base.at(time))
@@ -88,18 +82,15 @@ def demand(
 def shortest_duration(
     robot: Robot, limits: MissionLimits, joints: Course, base: Course, begin: float, span: float
 ) -> float:
-    """Return the duration at which a segment comes to the first of its limits.
+    """Return the duration at which a segment comes to the first of its limits, s.
 
     Args:
         robot: whose joints are all actuated.
         limits: beside those of the robot's joints.
-        joints: of the segment in ``span``.
-        base: of the segment in ``span``.
+        joints: course in ``span``.
+        base: course in ``span``.
         begin: s.
-        span: s, any duration that the segment was sampled with.
-
-    Raises:
-        InputError: none of what moves has a limit, or one is so low that it takes too long.
+        span: s, any duration.
     """
     shares = list(_shares(robot, limits, joints, base, begin, span))
     if not shares:
@@ -120,6 +111,7 @@ def shortest_duration(
 def _shares(
     robot: Robot, limits: MissionLimits, joints: Course, base: Course, begin: float, span: float
 ) -> Iterator[tuple[float, str]]:
+    # k times the duration: 1/k of rates and momenta, 1/k^2 of accelerations and torques
     asked = demand(robot, joints, base, begin, begin + span)
     rates = np.max(np.abs(asked.joints[:, 1]), axis=0)
     accelerations = np.max(np.abs(asked.joints[:, 2]), axis=0)

@@ -42,15 +42,7 @@ MOST_AWAY = 4.0 * np.pi
 
 
 def reactionless_course(start: SegmentStart, goal: Array) -> JointMaker:
-    """Return what makes the course along a reactionless path, quintic in time.
-
-    Args:
-        start: of the path.
-        goal: (n,) joint positions to approach.
-
-    Raises:
-        InputError: the goal is too far away.
-    """
+    """Return the course along a reactionless path to a goal (n,) as a function of the duration."""
     robot, away = start.robot, np.abs(goal - start.joints)
     if away.max() > MOST_AWAY:
         name = robot.joint_names[int(np.argmax(away))]
@@ -58,7 +50,7 @@ def reactionless_course(start: SegmentStart, goal: Array) -> JointMaker:
             f"reactionless: joint {name!r} is {away.max():.4g} rad or m away, at most "
             f"{MOST_AWAY:.4g} are planned"
         )
-    path = reactionless_path(robot, start.base.quaternion, start.joints, goal)
+    path = _reactionless_path(robot, start.base.quaternion, start.joints, goal)
 
     def along(span: float, _: Course) -> Course:
         times = knots(span)
@@ -67,15 +59,7 @@ def reactionless_course(start: SegmentStart, goal: Array) -> JointMaker:
     return along
 
 
-def reactionless_path(robot: Robot, quaternion: Array, start: Array, goal: Array) -> CubicSpline:
-    """Return the path from ``start`` as a spline over 0 to 1, by its length.
-
-    Args:
-        robot: whose joints are all actuated.
-        quaternion: (4,) attitude of the base, unit.
-        start: (N,) joint positions, rad or m.
-        goal: (N,) joint positions to approach.
-    """
+def _reactionless_path(robot: Robot, quaternion: Array, start: Array, goal: Array) -> CubicSpline:
     row = list(robot.model_rows)
     steps, ordered = np.empty((round(END / STEP) + 1, len(start))), np.empty((2, len(start)))
     ordered[:, row] = start, goal
@@ -133,6 +117,7 @@ def integrate_into(
                 momentum[k] = 0.0
                 for j in range(n):
                     momentum[k] += work.coupling[k, j] * slopes[stage, j]
+            # H~^+ H~ (theta_goal - theta), the part of the way that has momentum, is taken off it
             least_squares_into(work.coupling, momentum, scratch, direction)
             for j in range(n):
                 slopes[stage, j] -= direction[j]
@@ -146,12 +131,8 @@ def free_attitude(
 ) -> AttitudeCourse:
     """Return the motion of a free base during a motion of the joints from rest to rest.
 
-    Args:
-        robot: whose joints are all actuated.
-        joints: the motion.
-        quaternion: (4,) of the base at the begin, unit.
-        begin: s, of the motion.
-        times: (K,) s from there to the end, equally far apart.
+    The base begins with ``quaternion`` (4,); ``times`` (K,), s after ``begin``, are equally far
+    apart.
     """
     row = list(robot.model_rows)
     motion = joints.at(begin + with_middles(times))

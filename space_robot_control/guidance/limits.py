@@ -59,10 +59,7 @@ class MissionLimits(StrictModel):
 
 
 def shown_unit(robot: Robot, joint: int) -> tuple[float, str]:
-    """Return how many of the unit that a joint is written in make 1 rad or m, and that unit.
-
-    ``joint`` is counted from 0.
-    """
+    """Return how many of the unit that a joint is written in make 1 rad or m, and that unit."""
     return (1.0, "m") if robot.is_prismatic[joint] else (180.0 / np.pi, "degrees")
 
 
@@ -70,12 +67,8 @@ def shown_unit(robot: Robot, joint: int) -> tuple[float, str]:
 def check_piece(robot: Robot, piece: Piece) -> None:
     """Check a segment: finite, neither too long nor too sudden, within the limits of the joints.
 
-    Args:
-        robot: as the flight software knows it.
-        piece: the segment.
-
     Raises:
-        InputError: naming joint, time, value and limit.
+        InputError: it is not; names joint, time, value and limit.
     """
     span = piece.end - piece.begin
     if not SHORTEST_S <= span <= LONGEST_S:
@@ -158,11 +151,7 @@ def _check_limits(
 
 
 def check_start(robot: Robot, joints: Array) -> None:
-    """Check that the joints (n,), rad or m, of a start are within their limits.
-
-    Raises:
-        InputError: naming the first one beyond.
-    """
+    """Check that the joints (n,), rad or m, of a start are within their limits."""
     for joint, (name, limits) in enumerate(zip(robot.joint_names, robot.limits, strict=True)):
         low, high, position = limits.lower, limits.upper, float(joints[joint])
         if not low - ROUNDING <= position <= high + ROUNDING:

@@ -48,36 +48,38 @@ class TrajectoryPoint(NamedTuple):
     accelerations: Sequence[float]
 
 
-def braking(begin: float, joints: Array, rates: Array, base: BaseMotion) -> Piece:
-    """Return the piece that brings a moving reference to rest.
+def braking_pieces(
+    robot: Robot, begin: float, joints: Array, rates: Array, base: BaseMotion
+) -> list[Piece]:
+    """Return the piece that brings a moving reference to rest, or none if it is at rest.
 
     Args:
+        robot: as the flight software knows it; the piece is checked against its limits.
         begin: s.
         joints: (3, n) reference of the joints at ``begin``.
         rates: (10,) reference of the base.
         base: how the base goes on; one without a course comes to rest.
     """
+    base_rate = 0.0 if base.course else np.abs(rates[4:]).max()
+    if not max(np.abs(joints[1:]).max(), base_rate) > AT_REST:
+        return []
     rest = np.zeros_like(joints)
     rest[0] = joints[0] + 0.5 * BRAKE_S * joints[1]
     spline = QuinticSpline(np.array([0.0, BRAKE_S]), np.array([joints, rest]))
     turn, course = _onwards(begin, rates, base), SplineCourse(begin, spline)
     end = begin + BRAKE_S
     attitude = turn.at(np.array([end]))[0, :4]
-    return Piece(begin, end, course, turn, rest[0], attitude, "braking", base.mode)
+    piece = Piece(begin, end, course, turn, rest[0], attitude, "braking", base.mode)
+    check_piece(robot, piece)
+    return [piece]
 
 
 def _onwards(begin: float, rates: Array, base: BaseMotion) -> Course:
     return base.course or BrakedTurn(begin, BRAKE_S, rates[:4], rates[4:7], rates[7:])
 
 
-def is_moving(joints: Array, rates: Array, base: BaseMotion) -> bool:
-    """Return whether a reference (3, n) and (10,) moves that is to come to rest."""
-    of_base = 0.0 if base.course else np.abs(rates[4:]).max()
-    return bool(max(np.abs(joints[1:]).max(), of_base) > AT_REST)
-
-
 @np.errstate(all="ignore")  # numbers that overflow are refused, in one line
-def joined(
+def joined_trajectory(
     robot: Robot,
     names: Sequence[str],
     points: Sequence[TrajectoryPoint],
@@ -93,15 +95,15 @@ def joined(
     state; of one that is joined late also those that the joints cannot reach in time any more.
 
     Args:
-        robot: as the flight software knows it.
+        robot: see `braking_pieces`, as ``begin``, ``joints``, ``rates`` and ``base``.
         names: of the joints, in the order of the points' numbers.
         points: with rising times from 0 on; velocities and accelerations that are missing are
             those of a cubic spline through the positions. It ends at rest unless the last point
             says otherwise.
         begin: s.
-        joints: (3, n) reference of the joints at ``begin``.
-        rates: (10,) reference of the base.
-        base: how the base goes on; one without a course comes to rest.
+        joints: of the reference.
+        rates: of the reference.
+        base: of the reference.
         late: s, from the trajectory's start to ``begin``.
 
     Raises:
@@ -152,7 +154,7 @@ def _states(
     final = _row(last, order, "velocities") if len(last) else np.zeros(len(order))
     spline = CubicSpline(times, positions, joints[1], final)
     states = spline.at(times)
-    states[0] = joints
+    states[0] = joints  # nothing jumps, not even the acceleration
     states[-1, 2] = 0.0
     for k, point in enumerate(points, 1):
         if len(point.velocities):
@@ -162,16 +164,15 @@ def _states(
     return states
 
 
-def _row(values: Sequence[float], order: Sequence[int], what: str) -> Array:
+def _row(values: Sequence[float], order: Sequence[int], quantity: str) -> Array:
     if len(values) != len(order):
-        raise InputError(f"a point has {len(values)} {what} of {len(order)} joints")
+        raise InputError(f"a point has {len(values)} {quantity} of {len(order)} joints")
     row = np.array(values, dtype=np.float64)[list(order)]
     if not np.all(np.isfinite(row)):
-        raise InputError(f"a point has {what} that are not finite")
-    if np.abs(row).max() > MOST[what]:
-        raise InputError(
-            f"a point has {what} of {np.abs(row).max():g}, at most {MOST[what]:g} can be flown"
-        )
+        raise InputError(f"a point has {quantity} that are not finite")
+    largest, most = np.abs(row).max(), MOST[quantity]
+    if largest > most:
+        raise InputError(f"a point has {quantity} of {largest:g}, at most {most:g} can be flown")
     return row
 
 
@@ -195,15 +196,7 @@ class GoalTolerances(NamedTuple):
 
     @classmethod
     def read(cls, goal: Any, names: Sequence[str]) -> GoalTolerances:
-        """Read those of a goal.
-
-        Args:
-            goal: a FollowJointTrajectory.Goal.
-            names: of the n joints.
-
-        Raises:
-            InputError: a joint is unknown, or a number is negative or none.
-        """
+        """Read the tolerances of a FollowJointTrajectory.Goal for n joints."""
         duration = goal.goal_time_tolerance
         seconds = duration.sec + 1e-9 * duration.nanosec
         return cls(
@@ -222,11 +215,7 @@ class GoalTolerances(NamedTuple):
     ) -> GoalVerdict | None:
         """Compare measured joints with a trajectory; None: the goal goes on.
 
-        Args:
-            piece: the trajectory.
-            names: of the n joints.
-            time: (T,) s, rising.
-            measured: (T, 2, n) positions and velocities at these times.
+        ``measured`` (T, 2, n) are positions and velocities at rising times (T,), s.
         """
         error = np.abs(measured - piece.joints.at(np.minimum(time, piece.end))[:, :2])
         is_after = time >= piece.end
@@ -237,6 +226,7 @@ class GoalTolerances(NamedTuple):
             return GoalVerdict("PATH_TOLERANCE_VIOLATED", text)
         reached = (error <= self.goal).all(axis=(1, 2)) & is_after
         late = time > piece.end + self.time
+        # `True` behind the last time: never late
         if reached.any() and np.argmax(reached) <= np.argmax([*late, True]):
             return GoalVerdict("SUCCESSFUL")
         if late.any():
@@ -246,26 +236,27 @@ class GoalTolerances(NamedTuple):
         return None
 
 
-def _limits(what: str, entries: Sequence[Any], names: Sequence[str]) -> Array:
+def _limits(key: str, entries: Sequence[Any], names: Sequence[str]) -> Array:
     limits = np.full((len(MEASURED), len(names)), np.inf)
     for entry in entries:
-        joint = list(names).index(one_of(entry.name, names, "joint", f" of {what}"))
+        joint = list(names).index(one_of(entry.name, names, "joint", f" of {key}"))
         for order, quantity in enumerate(MEASURED):
             value = getattr(entry, quantity)
             if value > 0.0:
                 limits[order, joint] = value
             elif value not in NO_LIMIT:
                 raise InputError(
-                    f"{what}: {quantity} of joint {entry.name!r}: a number above 0 was expected, "
+                    f"{key}: {quantity} of joint {entry.name!r}: a number above 0 was expected, "
                     f"or 0 or -1 for no limit, got {value:g}"
                 )
     return limits
 
 
-def _excess(what: str, names: Sequence[str], time: float, error: Array, limits: Array) -> str:
+def _excess(key: str, names: Sequence[str], time: float, error: Array, limits: Array) -> str:
+    # a number that is missing is the largest error
     ratio = np.where(np.isnan(error) & np.isfinite(limits), np.inf, error / limits)
     order, joint = divmod(int(np.nanargmax(ratio)), len(names))
     return (
         f"the {MEASURED[order]} of joint {names[joint]!r} is off by {error[order, joint]:.4g} at "
-        f"t = {time:.4f} s, {what} is {limits[order, joint]:g}"
+        f"t = {time:.4f} s, {key} is {limits[order, joint]:g}"
     )

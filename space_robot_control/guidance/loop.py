@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 MOST_AT_ONCE = 100
 """Messages taken before the stream goes on: somebody may flood the topic."""
-CLOCK_WAIT_S = GREET_S = 0.05
+CLOCK_WAIT_S = RESEND_S = 0.05
 MOST_OWED_S = 60.0
 """A mission that was stopped for longer (simulated time) does not send what it owes."""
 
@@ -58,12 +58,12 @@ class MissionLoop:
         self._next = 0
         """The first tick that the stream has not reached."""
         self._invalid_stamps, self._listeners = 0, 0
-        self._greet_at = 0.0
+        self._resend_at = 0.0
         self._changes = MissionChanges(
             node,
             self._mission,
             lambda: (max(self._stamps.last, 0), self._next),
-            RobotNames.of(robot.joint_names, passive=robot.passive_names),
+            RobotNames(robot.joint_names, passive=robot.passive_names),
         )
         self._action = self._offer_action()
 
@@ -83,8 +83,8 @@ class MissionLoop:
     def step(self) -> Wait | None:
         """Send due chunks and read the clock."""
         now = time.monotonic()
-        if now >= self._greet_at:
-            self._greet_at = now + GREET_S
+        if now >= self._resend_at:
+            self._resend_at = now + RESEND_S
             self._resend_pending()
             self._changes.take()
         has_taken = self._take_clock()
@@ -112,6 +112,7 @@ class MissionLoop:
 
     def _resend_pending(self) -> None:
         listeners = self._joints.listener_count + self._base.listener_count
+        # topics keep nothing for subscribers that come later
         if listeners > self._listeners:
             self._next = min(self._next, self._chunk_start(max(self._stamps.last, 0)))
         self._listeners = listeners
@@ -136,11 +137,11 @@ class MissionLoop:
             except MessageError:  # not this graph's clock
                 self._invalid_stamps += 1
                 continue
-            if tick != self._stamps.last and not self._believe(tick):
+            if tick != self._stamps.last and not self._accept(tick):
                 self._invalid_stamps += 1
         return True
 
-    def _believe(self, tick: int) -> bool:
+    def _accept(self, tick: int) -> bool:
         stamps, last = self._stamps, self._stamps.last
         if not stamps.passes(tick):
             return False

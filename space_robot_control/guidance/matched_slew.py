@@ -50,13 +50,7 @@ class MatchedSlew:
     """
 
     def __init__(self, begin: float, span: float, before: Course, after: Course) -> None:
-        """Match the ends.
-
-        Args:
-            begin: s, when the base leaves ``before``.
-            span: s until it is on ``after``, above 0.
-            before: of the base, up to ``begin``.
-            after: of the base, from ``begin + span`` on.
+        """Match the ends: the base leaves ``before`` at ``begin`` and is on ``after`` a span later.
 
         Raises:
             InputError: the rates at the begin would carry the base once round in this time.
@@ -93,13 +87,10 @@ class MatchedSlew:
 
 @kernel
 def match_into(old: Array, new: Array, turn: Array) -> None:
-    """Write what leads from one motion to another at the same time.
+    """Write what leads from one motion (10,) of the base to another at the same time.
 
-    Args:
-        old: (10,) quaternion, velocity and acceleration on the base's axes.
-        new: (10,) the same of the other motion.
-        turn: (3, 3) written: rotation vector from the new attitude to the old one, the shorter
-            way, rad, its rate and second derivative.
+    ``turn`` (3, 3) is written: the rotation vector from the new attitude to the old one, the
+    shorter way, rad, its rate and second derivative.
     """
     q = multiply((new[0], -new[1], -new[2], -new[3]), (old[0], old[1], old[2], old[3]))
     if q[0] < 0.0:
@@ -112,6 +103,7 @@ def match_into(old: Array, new: Array, turn: Array) -> None:
     back = (q[0], -q[1], -q[2], -q[3])
     carried = rotated(back, vector(new, 4))
     omega = subtract(vector(old, 4), carried)
+    # the axes on which `carried` is written turn with omega: its derivative there has -omega x it
     alpha = add(subtract(vector(old, 7), rotated(back, vector(new, 7))), cross(omega, carried))
     rate = by_inverse_jacobian(phi, omega)
     second = by_inverse_jacobian(phi, subtract(alpha, jacobian_rate(phi, rate)))
@@ -152,7 +144,7 @@ def coefficients(phi: Vector) -> tuple[float, float, float, float]:
     """Return ``a``, ``b`` and their derivatives with respect to t, divided by t."""
     ratio, cosine = half_turn(phi)
     square, sine = dot(phi, phi), ratio * cosine  # sin(t) / t
-    a = 0.5 * ratio * ratio
+    a = 0.5 * ratio * ratio  # 1 - cos t = 2 sin^2(t / 2), which loses no digits for small t
     if square < SMALL * SMALL:
         return (
             a,
@@ -188,6 +180,6 @@ def by_inverse_jacobian(phi: Vector, omega: Vector) -> Vector:
     square = dot(phi, phi)
     factor = 1.0 / 12.0 + square / 720.0
     if square > SMALL * SMALL:
-        factor = (1.0 - cosine / ratio) / square
+        factor = (1.0 - cosine / ratio) / square  # (1 - (t / 2) cot(t / 2)) / t^2
     across = cross(phi, omega)
     return add(add(omega, scale(across, 0.5)), scale(cross(phi, across), factor))

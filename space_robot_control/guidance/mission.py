@@ -28,7 +28,7 @@ from space_robot_msgs_py.samples import ReferenceChunk
 
 from .courses import BaseMotion, Piece, SteadyTurn
 from .goals import PointingGoal
-from .limits import MissionLimits, check_piece, check_start
+from .limits import MissionLimits, check_start
 from .planner import Planner
 from .segments import FileSegment, HoldSegment, read_pointing, read_segments
 
@@ -107,11 +107,7 @@ class MissionNodeSettings(MissionSettings, NodeSettings):
 
     @classmethod
     def read_layer(cls, path: Path, selected: Mapping[str, str]) -> Tree:
-        """Read a parameter file, a mission's document, or a trajectory.
-
-        Raises:
-            InputError: the file cannot be read, or a key in it is wrong.
-        """
+        """Read a parameter file, a mission's document, or a trajectory."""
         layer = mission_layer(path, cls.node, selected["robot"])
         if texts := layer.get("segments"):
             layer["segments"] = [with_columns(text, path.parent) for text in texts]
@@ -119,14 +115,9 @@ class MissionNodeSettings(MissionSettings, NodeSettings):
 
 
 def with_columns(text: str, folder: Path) -> str:
-    """Return the text of a segment with the columns of its file in place of the file's name.
+    """Return a segment's YAML text with its file's columns in place of the file's name.
 
-    Args:
-        text: of the segment, YAML.
-        folder: where a relative path begins.
-
-    Raises:
-        InputError: the file cannot be read.
+    A relative path begins in ``folder``.
     """
     try:
         content = parse_yaml(text)
@@ -163,9 +154,10 @@ class Mission:
         base = self._base_at_start(settings, np.array(settings.base_quaternion) / length)
         self.period = period
         """s, of a tick."""
-        self._robot, self._limits = robot.nominal, settings.limits
-        self._start = joints, base.quaternion
-        planner, segments = self._new_planner(), read_segments(settings.segments)
+        self._robot, limits = robot.nominal, settings.limits
+        # asked for when a segment needs it, so that `uses_orbit` can tell whether any did
+        planner = Planner(self._robot, joints, base.quaternion, limits, lambda: self.ephemeris)
+        self._planner, segments = planner, read_segments(settings.segments)
         self.pieces = planner.plan(0.0, joints, base, segments or [HoldSegment(hold=1.0)])
         """The planned segments; at least one."""
         self._goes_on = planner.base.course if planner.base.mode else None
@@ -177,9 +169,6 @@ class Mission:
     def leads_tool(self) -> bool:
         """Whether more is led than the joints from posture to posture."""
         return any(piece.motion not in ("joints", "hold") for piece in self.pieces)
-
-    def _new_planner(self) -> Planner:
-        return Planner(self._robot, *self._start, self._limits, lambda: self.ephemeris)
 
     @cached_property
     def ephemeris(self) -> Ephemeris | None:
@@ -217,21 +206,14 @@ class Mission:
         """Fly a segment, written as in a mission, from a tick on, in place of what was planned.
 
         Joints that move at that tick are brought to rest first, and so is the base, unless it
-        points or is on its way there.
-
-        Returns:
-            The planned segment.
-
-        Raises:
-            InputError: the segment is wrong or cannot be flown; the mission is as it was.
+        points or is on its way there. Return the planned segment; one that is refused leaves the
+        mission as it was.
         """
-        from .live import braking, is_moving
+        from .live import braking_pieces
 
         begin, joints, rates, base = self._state_at(tick)
-        before = []
-        if is_moving(joints, rates, base):
-            before = [braking(begin, joints, rates, base)]
-            check_piece(self._robot, before[0])
+        before = braking_pieces(self._robot, begin, joints, rates, base)
+        if before:
             begin, joints = before[0].end, before[0].goal[np.newaxis]
             base = base._replace(quaternion=before[0].attitude)
         segments = read_segments([segment])
@@ -240,7 +222,7 @@ class Mission:
         # whoever reaches the node could have it read any file
         if isinstance(segments[0], FileSegment):
             raise InputError("file: no file is read in flight, give the columns as trajectory")
-        pieces = self._new_planner().plan(begin, joints[0], base, segments)
+        pieces = self._planner.plan(begin, joints[0], base, segments)
         self._replace([*before, *pieces])
         return pieces[-1]
 
@@ -253,17 +235,16 @@ class Mission:
     ) -> Piece:
         """Fly a trajectory of the joints in place of what was planned.
 
+        One that is refused leaves the mission as it was.
+
         Args:
             tick: the first one whose reference may change.
-            names: see `joined`.
-            points: see `joined`.
+            names: of the joints, see `joined_trajectory`.
+            points: of the trajectory, see `joined_trajectory`.
             start: s, simulated time of the trajectory's start; None: at ``tick``. What was planned
                 is flown until then; a trajectory that has started already is joined.
-
-        Raises:
-            InputError: the trajectory is wrong; the mission is as it was.
         """
-        from .live import START_WITHIN_S, braking, is_moving, joined
+        from .live import START_WITHIN_S, braking_pieces, joined_trajectory
 
         late = 0.0
         if start is not None:
@@ -274,14 +255,11 @@ class Mission:
                 )
             tick = max(tick, math.ceil(start / self.period - ROUNDING))
             late = max(0.0, tick * self.period - start)
-        piece = joined(self._robot, names, points, *self._state_at(tick), late)
+        piece = joined_trajectory(self._robot, names, points, *self._state_at(tick), late)
         end = np.array([piece.end])
         joints, rates = piece.joints.at(end)[0], piece.base.at(end)[0]
         base = BaseMotion(rates[:4], piece.base if piece.mode else None, piece.mode)
-        is_rolling = is_moving(joints, rates, base)
-        after = [braking(piece.end, joints, rates, base)] if is_rolling else []
-        for part in after:
-            check_piece(self._robot, part)
+        after = braking_pieces(self._robot, piece.end, joints, rates, base)
         self._replace([piece, *after])
         return piece
 
@@ -311,11 +289,7 @@ class Mission:
 
 
 def pointing_start(settings: MissionSettings) -> tuple[list[float], list[float]]:
-    """Return attitude (4,) and rate (3,), degrees/s, base axes, of a mission that starts pointing.
-
-    Raises:
-        InputError: what ``base_point`` says cannot be pointed at.
-    """
+    """Return attitude (4,) and rate (3,), degrees/s, base axes, of a start that points."""
     assumed = settings.assumed_orbit
     _, course = _pointing(settings, Ephemeris(assumed) if assumed.has_orbit else None)
     motion = course.at(np.zeros(1))[0]

@@ -23,15 +23,13 @@ from space_robot_msgs_py.wire.definitions import decode
 from .courses import Piece
 from .mission import Mission
 
-Array = NDArray[np.float64]
-
 GOTO = "goto"
 UNFORESEEN = (ArithmeticError, AttributeError, LookupError, MemoryError, TypeError, ValueError)
 """What planning raises for numbers that no check has foreseen; the flight must go on."""
-TOLD_S = 1.0
+WARNING_S = 1.0
 """Time for which a refusal is the node's mode in /diagnostics, from where `fly` prints it, s."""
-MOST_TOLD = 20
-"""Refusals that wait to be told, if somebody floods the topic."""
+MOST_WARNINGS = 20
+"""Refusals that wait to be reported, if somebody floods the topic."""
 
 
 class MissionChanges:
@@ -46,11 +44,7 @@ class MissionChanges:
     ) -> None:
         """Subscribe, and accept the parameter.
 
-        Args:
-            node: of the mission.
-            mission: to be changed.
-            ticks: returns the present tick, and the first one whose reference has not been sent.
-            names: of the joints.
+        ``ticks`` returns the present tick, and the first one whose reference has not been sent.
         """
         self._node, self._mission, self._ticks = node, mission, ticks
         self.names = names
@@ -60,17 +54,17 @@ class MissionChanges:
         self.latest: Piece | None = None
         """The last motion that was asked for in flight."""
         self.counts = {"trajectories accepted": 0, "trajectories refused": 0}
-        self._warnings, self._warning = deque[str](maxlen=MOST_TOLD), ""
-        self._told_until = 0.0
+        self._warnings, self._warning = deque[str](maxlen=MOST_WARNINGS), ""
+        self._warning_until = 0.0
 
     @property
     def time(self) -> float:
         """Simulated time, s."""
         return self._ticks()[0] * self._mission.period
 
-    def joints(self) -> Array:
+    def joints(self) -> NDArray[np.float64]:
         """Return the reference (3, n) of the joints at this time."""
-        joints: Array = self._mission.chunk(self._ticks()[0], 1).joints[0]
+        joints: NDArray[np.float64] = self._mission.chunk(self._ticks()[0], 1).joints[0]
         return joints
 
     def take(self) -> None:
@@ -81,14 +75,10 @@ class MissionChanges:
             except MessageError as error:
                 self.refuse(str(error))
             except InputError:
-                pass  # has been told
+                pass  # `follow` has reported it
 
     def follow(self, trajectory: Any) -> None:
-        """Follow a trajectory_msgs/JointTrajectory.
-
-        Raises:
-            InputError: it is wrong; the mission is as it was.
-        """
+        """Follow a trajectory_msgs/JointTrajectory; a refused one leaves the mission as it was."""
         from .live import TrajectoryPoint  # slow to import, and most flights need none
 
         stamp = trajectory.header.stamp
@@ -141,7 +131,7 @@ class MissionChanges:
         self._node.log(f"{piece.motion} from t = {piece.begin:.4f} s to {piece.end:.4f} s")
 
     def refuse(self, reason: str) -> None:
-        """Count and tell a refused trajectory."""
+        """Count and report a refused trajectory."""
         self.counts["trajectories refused"] += 1
         self.warn(f"refused a trajectory: {reason}")
 
@@ -151,8 +141,8 @@ class MissionChanges:
         self._node.log(self._warnings[-1])
 
     def next_warning(self) -> str:
-        """Return what was refused or failed, each at one call at least, the last for a second."""
+        """Return the warning to report: each one at least once, the last one for a second."""
         now = time.monotonic()
         if self._warnings:
-            self._warning, self._told_until = self._warnings.popleft(), now + TOLD_S
-        return self._warning if now < self._told_until else ""
+            self._warning, self._warning_until = self._warnings.popleft(), now + WARNING_S
+        return self._warning if now < self._warning_until else ""

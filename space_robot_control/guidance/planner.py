@@ -45,7 +45,7 @@ class Planner:
         joints: Array,
         quaternion: Array,
         limits: MissionLimits,
-        ephemeris: Callable[[], Ephemeris | None] = lambda: None,
+        ephemeris: Callable[[], Ephemeris | None],
     ) -> None:
         """Begin a plan.
 
@@ -56,17 +56,17 @@ class Planner:
             limits: of fast segments, beside those of the joints.
             ephemeris: returns that of the assumed orbit; None: there is none.
         """
-        self._robot, self._limits, self._ephemeris = robot.nominal, limits, ephemeris
+        self._robot, self._limits, self._ephemeris = robot, limits, ephemeris
         self._first = quaternion, joints
         self.base = BaseMotion(quaternion)
         """How the base goes on after the last planned segment."""
 
     @cached_property
     def _origin(self) -> Array:
-        from .tool_paths import ToolFollower
+        from .tool_paths import ToolPoses
 
-        pose = ToolFollower(self._robot, None).pose(*self._first)
-        return pose.position - pose.from_base
+        position, from_base, _ = ToolPoses(self._robot, None).pose(*self._first)
+        return position - from_base
 
     @np.errstate(all="ignore")  # numbers that overflow are refused, in one line
     def plan(
@@ -123,7 +123,7 @@ class Planner:
         goal = None if segment.base == "free" else segment.base
         quaternion, before = base.quaternion, base.before or base.course
         _check_turning(segment, base)
-        if goal is None or goal == base.mode:
+        if goal is None or goal == base.mode:  # it goes on as it moves
             return LedBase(lambda _: base.held, base.course, base.mode)
         if isinstance(goal, PointingGoal):
             from .matched_slew import MatchedSlew

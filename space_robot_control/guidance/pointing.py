@@ -50,16 +50,10 @@ class PointingCourse:
     def __init__(
         self, goal: PointingGoal, ephemeris: Ephemeris | None, begin: float, near: Array
     ) -> None:
-        """Take what points where.
+        """Take what points where from ``begin``, s, on.
 
-        Args:
-            goal: the keys of the segment.
-            ephemeris: of the assumed orbit; None: there is none.
-            begin: s, of the segment.
-            near: (4,) quaternion in whose hemisphere the first one is.
-
-        Raises:
-            InputError: there is no orbit or no target, but one is needed; names the key.
+        ``near`` (4,) is a quaternion in whose hemisphere the first one is. Without an orbit
+        ``ephemeris`` is None, and only fixed directions can be pointed at.
         """
         first: str | list[float] = goal.direction or goal.point
         for key, name in (("point", first), ("about", goal.about)):
@@ -104,7 +98,7 @@ class PointingCourse:
             time = np.minimum(begin + CHECKED_EVERY * numbers, end)
             sines, lengths = np.moveaxis(self._rows(time, self._anchors[:0])[:, 10:], 1, 0)
             nearest = int(np.argmin(lengths))
-            if self._goal.point == "target" and not lengths[nearest] >= NEAREST:
+            if self._goal.point == "target" and not lengths[nearest] >= NEAREST:  # true of NaN
                 raise InputError(
                     f"base.point: target is {lengths[nearest]:.3g} m from the reference point at "
                     f"t = {time[nearest]:.6g} s: at least {NEAREST:g} m are needed to point at it"
@@ -138,6 +132,7 @@ class PointingCourse:
         known = len(self._anchors)
         needed = max(int((latest - self._begin) / ANCHOR_S) + 1, 1)
         if needed > known:
+            # half as many again, so that a flight that goes on and on seldom needs more
             numbers = np.arange(known, needed + known // 2, dtype=np.float64)
             attitudes = self._rows(self._begin + ANCHOR_S * numbers, self._anchors[:0])[:, :4]
             last = self._anchors[-1] if known else self._near
@@ -180,7 +175,7 @@ def pointing_into(
     zero = (0.0, 0.0, 0.0)
     point, target = (zero, zero, zero, zero), (zero, zero, zero, zero)
     for i in range(len(time)):
-        if kinds[0] != FIXED or kinds[1] != FIXED:
+        if kinds[0] != FIXED or kinds[1] != FIXED:  # else there may be no orbit
             point = point_motion(nodes, time[i], has_j2)
         if kinds[0] == TARGET or kinds[1] == TARGET:
             target = target_motion(nodes, time[i], has_j2, point)
@@ -236,7 +231,9 @@ def turning(
     length, stretch = dot(p, t1), dot(pd, t1)
     v1, v2 = dot(v, t1), dot(v, t2)
     vd1, vd2 = dot(vd, t1), dot(vd, t2)
+    # p = (P, 0, 0) has the rate (P', z P, -y P): all that pd has along t2 and t3 is turning
     y, z = -dot(pd, t3) / length, dot(pd, t2) / length
+    # v has no part along t3, so that vd t3 = x v2 - y v1
     x = (dot(vd, t3) + y * v1) / v2
     yd = (x * z * length - 2.0 * y * stretch - dot(pdd, t3)) / length
     zd = (dot(pdd, t2) - 2.0 * z * stretch - x * y * length) / length

@@ -1,8 +1,7 @@
-"""Segments of a mission: what is written of each kind, and the courses that it becomes.
+"""Segments of a mission: the keys of each kind, and the courses that they become.
 
-A kind is one class: its keys with their limits, and `joints`, the course of the joints that it
-makes. Splines and tools are imported where they are used: they are slow to import, and a mission of
-joints needs none.
+A kind is one class: its keys with their limits, and `joints`, the course of the joints. Splines and
+tools are imported where they are used: they are slow to import, and a mission of joints needs none.
 """
 
 from __future__ import annotations
@@ -32,14 +31,14 @@ MOST_BENDS = 100
 
 
 BaseGoal = Attitude | PointingGoal | BaseTurn | Literal["free"]
-KINDS_OF_BASE: dict[str, type[Attitude] | type[PointingGoal] | type[BaseTurn]] = {
+BASE_KINDS: dict[str, type[Attitude] | type[PointingGoal] | type[BaseTurn]] = {
     "rpy_deg": Attitude,
     "quaternion": Attitude,
     "point": PointingGoal,
     "turn_deg": BaseTurn,
 }
-"""Keys that tell what is said of the base."""
-BASE_KEYS = tuple(dict.fromkeys(k for kind in KINDS_OF_BASE.values() for k in kind.model_fields))
+"""Kinds of goals of the base by the keys that identify them."""
+BASE_KEYS = tuple(dict.fromkeys(k for kind in BASE_KINDS.values() for k in kind.model_fields))
 
 
 def _base_goal(content: Any) -> BaseGoal:
@@ -48,10 +47,10 @@ def _base_goal(content: Any) -> BaseGoal:
         return goal
     if isinstance(content, str):
         content = {"point": content}
-    keys = [key for key in KINDS_OF_BASE if isinstance(content, dict) and key in content]
-    if len({KINDS_OF_BASE[key] for key in keys}) > 1:
+    keys = [key for key in BASE_KINDS if isinstance(content, dict) and key in content]
+    if len({BASE_KINDS[key] for key in keys}) > 1:
         raise ValueError(f"{' and '.join(keys)} were given: give one of them")
-    return (KINDS_OF_BASE[keys[0]] if keys else Attitude).model_validate(content)
+    return (BASE_KINDS[keys[0]] if keys else Attitude).model_validate(content)
 
 
 def _seconds(content: Any) -> Any:
@@ -67,9 +66,9 @@ class Segment(StrictModel):
     """A part of a mission in which the joints stay, and the base moves; the kinds are below."""
 
     key: ClassVar[str] = "base"
-    """That a segment of this kind has."""
+    """Identifies the kind."""
     excludes: ClassVar[tuple[str, ...]] = ()
-    """Keys of all kinds that this one has not."""
+    """Keys of the classes above that this kind does not have."""
 
     base: Annotated[BaseGoal | None, PlainValidator(_base_goal)] = Field(
         None,
@@ -103,20 +102,14 @@ class Segment(StrictModel):
         return " and ".join(words)
 
     def joints(self, start: SegmentStart) -> JointMaker:
-        """Return what makes the course of the joints from a start.
-
-        Raises:
-            InputError: they cannot move so.
-        """
+        """Return the joints' course as a function of duration and course of the base."""
         rise = np.zeros_like(start.joints)
         return lambda span, _: QuinticLeg(start.time, span, start.joints, rise)
 
     def courses(self, start: SegmentStart, turn: Callable[[float], Course]) -> Maker:
-        """Return what makes the courses of joints and base from a start.
+        """Return both courses as a function of the duration, s.
 
-        Args:
-            start: of the segment.
-            turn: makes the course of a base that is not free in a duration, s.
+        ``turn`` is the course of a base that is not free as a function of the duration.
         """
         make = self.joints(start)
 
@@ -147,7 +140,7 @@ class JointSegment(Segment):
     )
 
     def joints(self, start: SegmentStart) -> JointMaker:
-        """Return what makes the course of the joints from a start."""
+        """Return the joints' course as a function of duration and course of the base."""
         rise = posture(start.robot, self.joints_deg, "joints_deg") - start.joints
         if self.bends_deg is None:
             return lambda span, _: QuinticLeg(start.time, span, start.joints, rise)
@@ -162,7 +155,7 @@ class ToolSegment(Segment):
     tool: ToolGoal
 
     def courses(self, start: SegmentStart, turn: Callable[[float], Course]) -> Maker:
-        """Return what makes the courses of joints and base from a start."""
+        """Return both courses as a function of the duration, s."""
         from .tool_paths import ToolCourses
 
         if self.is_base_free and self.tool.frame != "base":
@@ -170,7 +163,7 @@ class ToolSegment(Segment):
         return super().courses(start, turn)
 
     def joints(self, start: SegmentStart) -> JointMaker:
-        """Return what makes the course of the joints from a start."""
+        """Return the joints' course as a function of duration and course of the base."""
         from .tool_paths import ToolCourses
 
         return ToolCourses(self.tool, start).led
@@ -203,7 +196,7 @@ class ReactionlessSegment(Segment):
     reactionless: PostureGoal
 
     def joints(self, start: SegmentStart) -> JointMaker:
-        """Return what makes the course of the joints from a start."""
+        """Return the joints' course as a function of duration and course of the base."""
         from .free_base import reactionless_course
 
         goal = posture(start.robot, self.reactionless.joints_deg, "reactionless")
@@ -244,20 +237,16 @@ SEGMENT_KINDS: dict[str, type[Segment]] = {
         *(FileSegment, TableSegment, Segment),
     )
 }
-"""Kinds of segments by the key that each of them has."""
-OF_ALL = Segment.allowed_keys()
+"""Kinds of segments by their keys."""
+COMMON_KEYS = Segment.allowed_keys()
 SEGMENT_KEYS = (
-    *(k for kind in SEGMENT_KINDS.values() for k in kind.allowed_keys() if k not in OF_ALL),
-    *OF_ALL,
+    *(k for kind in SEGMENT_KINDS.values() for k in kind.allowed_keys() if k not in COMMON_KEYS),
+    *COMMON_KEYS,
 )
 
 
 def posture(robot: Robot, values: Sequence[float], key: str) -> Array:
-    """Return the positions (n,) of joints that are written in degrees, rad or m.
-
-    Raises:
-        InputError: there are too few or too many values, or one is too large; names the key.
-    """
+    """Return the positions (n,), rad or m, of joints that a key has in degrees or m."""
     if len(values) != robot.n:
         raise InputError(f"{key}: {robot.n} values were expected, got {len(values)}")
     positions = robot.from_degrees(values)
@@ -307,11 +296,7 @@ def _segment(text: str, where: str) -> Segment:
 
 
 def read_pointing(text: str, where: str) -> PointingGoal:
-    """Return what the base points at, written as YAML text.
-
-    Raises:
-        InputError: it is wrong; names ``where``.
-    """
+    """Return what the base points at, written as YAML text; an error names ``where``."""
     content = _parsed(text, where)
     content = {"point": content} if isinstance(content, str) else content
     _check_keys(content, where, tuple(PointingGoal.model_fields))

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -57,18 +55,42 @@ BACK = np.array([1.0, -1.0, -1.0, -1.0])
 """Conjugates a quaternion."""
 
 
+class ToolPoses:
+    """Poses of a tool of a robot whose joints are all actuated."""
+
+    def __init__(self, robot: Robot, tool: str | None) -> None:
+        """Take a tool by name; None: the first."""
+        self.model, self.mounted = robot.model, mounted_tool(robot, tool)
+        self.rows = list(robot.model_rows)
+        """Place of each joint in the order of ``model``."""
+        self.work = ToolKinematics.allocate(robot.joint_count)
+
+    def ordered(self, joints: Array) -> Array:
+        """Return joint positions (N,) in the order of ``model``."""
+        positions = np.empty(len(joints))
+        positions[self.rows] = joints
+        return positions
+
+    def pose(self, quaternion: Array, joints: Array) -> tuple[Array, Array, Array]:
+        """Return the pose of the tool at an attitude (4,) and joint positions (N,).
+
+        Returns:
+            Positions (3,) from the robot's centre of mass and from the base's frame, m, and the
+            rotation (3, 3) from the tool's frame, all to inertial axes. ``work`` has the Jacobians.
+        """
+        work = self.work
+        tool_kinematics_into(self.model, quaternion, self.ordered(joints), *self.mounted, work)
+        return work.position.copy(), work.position + work.centre_of_mass, work.rotation.copy()
+
+
 class ToolCourses:
     """Courses towards a goal of a tool from a start, for any duration."""
 
     def __init__(self, goal: ToolGoal, start: SegmentStart) -> None:
-        """Prepare the courses.
-
-        Raises:
-            InputError: there is no such tool, or no orbit whose axes the goal is on.
-        """
+        """Prepare the courses; there may be no such tool, or no orbit whose axes the goal is on."""
         self._goal, self._start = goal, start
         self._quaternion = start.base.quaternion
-        self._follower = ToolFollower(start.robot, goal.link)
+        self._tool = ToolPoses(start.robot, goal.link)
         self._orbit_axes: Course | None = None
         """How the axes of a goal with ``frame: orbit`` turn, as a course of the base."""
         if goal.frame == "orbit":
@@ -78,15 +100,13 @@ class ToolCourses:
             self._orbit_axes = PointingCourse(ORBIT_AXES, ephemeris, begin, near)
 
     def led(self, span: float, base: Course) -> Course:
-        """Return the course of the joints while the base moves along a course.
-
-        Raises:
-            InputError: a pose cannot be reached.
-        """
+        """Return the course of the joints while the base moves along a course."""
         course = self._led(base, span, 0.0)
         if self._goal.least == "motion":
             return course
-        coupling = self._follower.coupling(self._quaternion, self._start.joints)
+        self._tool.pose(self._quaternion, self._start.joints)
+        coupling = self._tool.work.coupling[:, self._tool.rows]
+        # weights are relative to this robot's mass, by the mean square of a joint's momentum
         mean = float(np.sum(coupling * coupling)) / coupling.shape[1]
         least = self._largest_torque(course, base, span)
         for weight in MOMENTUM_WEIGHTS:
@@ -105,19 +125,22 @@ class ToolCourses:
 
     def _led(self, base: Course, span: float, momentum_weight: float) -> Course:
         begin, joints, times = self._start.time, self._start.joints, knots(span)
-        follower, from_base = self._follower, self._goal.frame == "base"
+        tool, from_base = self._tool, self._goal.frame == "base"
         share, _, _ = quintic(times / span)
         attitudes = base.at(begin + times)[:, :4]
         axes = None if self._orbit_axes is None else self._orbit_axes.at(begin + times)
         positions, rotations = self._path(attitudes if axes is None else axes[:, :4], share)
         if not from_base:
             self._join(base, axes, times, positions, rotations)
-        postures, reached = follower.follow(
-            attitudes, positions, rotations, from_base, joints, momentum_weight
+        out = np.zeros((len(times), len(joints)))
+        path, near = (attitudes, positions, rotations, from_base), tool.ordered(joints)
+        reached = follow_path_into(
+            tool.model, *path, *tool.mounted, momentum_weight, near, tool.work, out
         )
+        postures = out[:, tool.rows]
         if reached < len(times):
-            pose = follower.pose(attitudes[reached], postures[reached])
-            left = positions[-1] - (pose.from_base if from_base else pose.position)
+            position, position_from_base, _ = tool.pose(attitudes[reached], postures[reached])
+            left = positions[-1] - (position_from_base if from_base else position)
             raise InputError(
                 f"the tool cannot follow its path beyond t = {begin + times[reached]:.2f} s, "
                 f"{norm(left):.3g} m from its goal: out of reach, or a singular posture"
@@ -125,22 +148,22 @@ class ToolCourses:
         return SplineCourse(begin, CubicSpline(times, postures))
 
     def free(self, span: float) -> tuple[Course, Course]:
-        """Return the courses while the base turns freely, to a goal on inertial axes.
-
-        Raises:
-            InputError: a pose cannot be reached.
-        """
-        begin, times = self._start.time, knots(span)
+        """Return the courses while the base turns freely, to a goal on inertial axes."""
+        begin, times, tool = self._start.time, knots(span), self._tool
         share = with_middles(times) / span
         if self._goal.frame == "orbit":
             raise InputError("base: free does not go with tool.frame: orbit")
         positions, rotations = self._path(np.empty((0, 4)), quintic(share)[0])
-        # in a long one knots are far apart: the same path is followed in less time
+        # in a long one knots are far apart: the same path is followed in less time, as without
+        # momentum the motion of the base depends on the path alone
         slower = float(times[1]) / KNOT_S if len(times) == MOST_KNOTS else 1.0
-        twists = twists_along(positions, rotations, share, span / slower)
-        postures, attitudes, error = self._follower.follow_free(
-            *(positions, rotations, twists, float(times[1]) / slower),
-            *(self._start.joints, self._quaternion),
+        twists = _twists(positions, rotations, share, span / slower)
+        out, attitudes = np.empty((len(times), len(tool.rows))), np.empty((len(times), 4))
+        out[0], attitudes[0] = tool.ordered(self._start.joints), self._quaternion
+        path, spacing = (positions, rotations, twists), float(times[1]) / slower
+        work = FreeBase.allocate(len(tool.rows))
+        error = follow_free_path_into(
+            tool.model, *path, spacing, *tool.mounted, work, out, attitudes
         )
         if not error <= FREE_TOLERANCE:
             raise InputError(
@@ -148,35 +171,35 @@ class ToolCourses:
                 "off: out of reach, or near a dynamic singularity"
             )
         base = AttitudeCourse(begin, CubicSpline(times, attitudes))
-        return SplineCourse(begin, CubicSpline(times, postures)), base
+        return SplineCourse(begin, CubicSpline(times, out[:, tool.rows])), base
 
     def _path(self, attitudes: Array, share: Array) -> tuple[Array, Array]:
         # attitudes (K, 4) of the axes that the path lies on: the base's, or the orbit's; returns
         # positions (K, 3) and orientations (K, 3, 3) on inertial axes, or (0, 3, 3) if it has none
         goal = self._goal
-        here = self._follower.pose(self._quaternion, self._start.joints)
+        position, from_base, rotation = self._tool.pose(self._quaternion, self._start.joints)
         turn = _matrix(goal.unit_quaternion) if goal.is_given else None
         xyz = None if goal.xyz is None else np.array(goal.xyz)
         if goal.frame in ("base", "orbit"):
-            axes = np.array([_matrix(attitude) for attitude in attitudes])
+            axes = _matrices(attitudes)
             back, is_shift = axes[0].T, goal.frame == "orbit"
-            first = product(back, here.position if is_shift else here.from_base)
+            first = product(back, position if is_shift else from_base)
             last = first if xyz is None else first + xyz if is_shift else xyz
             line = _line(first, last, share)
-            positions = np.array([product(a, p) for a, p in zip(axes, line, strict=True)])
+            positions = _products(axes, line)
             if turn is None:
                 return positions, np.empty((0, 3, 3))
-            rotation = product(back, here.rotation)
+            rotation = product(back, rotation)
             inner = _turned(rotation, product(turn, rotation) if is_shift else turn, share)
-            return positions, np.array([product(a, r) for a, r in zip(axes, inner, strict=True)])
-        end = here.position
+            return positions, _products(axes, inner)
+        end = position
         if xyz is not None:
-            end = (here.position if goal.frame == "start" else self._start.origin()) + xyz
-        positions = _line(here.position, end, share)
+            end = (position if goal.frame == "start" else self._start.origin()) + xyz
+        positions = _line(position, end, share)
         if turn is None:
             return positions, np.empty((0, 3, 3))
-        last = product(turn, here.rotation) if goal.frame == "start" else turn
-        return positions, _turned(here.rotation, last, share)
+        last = product(turn, rotation) if goal.frame == "start" else turn
+        return positions, _turned(rotation, last, share)
 
     def _join(
         self, base: Course, axes: Array | None, times: Array, positions: Array, rotations: Array
@@ -207,16 +230,15 @@ class ToolCourses:
             if len(rotations):
                 turn = multiplied(carried, fixed * BACK)
                 turn = _matrices(unit_rows(still + share * (turn - still)))
-                rotations[near] = np.array(
-                    [product(t, r) for t, r in zip(turn, rotations[near], strict=True)]
-                )
+                rotations[near] = _products(turn, rotations[near])
             positions[near] += share * away
 
 
 def _turns(vectors: Array) -> Array:
     angles = norms(vectors)
     sines, cosines = sines_cosines(0.5 * angles)
-    return np.column_stack((cosines, vectors * (sines / np.maximum(angles, 1e-300))[:, np.newaxis]))
+    shares = sines / np.maximum(angles, 1e-300)  # 0 of a vector that is 0
+    return np.column_stack((cosines, vectors * shares[:, np.newaxis]))
 
 
 def _matrices(quaternions: Array) -> Array:
@@ -229,6 +251,10 @@ def _matrix(quaternion: Array) -> Array:
     return matrix
 
 
+def _products(matrices: Array, others: Array) -> Array:
+    return np.array([product(a, b) for a, b in zip(matrices, others, strict=True)])
+
+
 def _line(first: Array, last: Array, share: Array) -> Array:
     return first + (last - first) * share[:, np.newaxis]
 
@@ -237,18 +263,10 @@ def _turned(first: Array, last: Array, share: Array) -> Array:
     start, goal = quaternion_of_rotation(first), quaternion_of_rotation(last)
     axis, angle = turn_between(start, goal)
     steps = multiplied(start, turned_by(axis, angle * share))
-    return np.array([_matrix(step) for step in steps])
+    return _matrices(steps)
 
 
-def twists_along(positions: Array, rotations: Array, share: Array, span: float) -> Array:
-    """Return the twists (T, 6) along a line and the shortest turn, on inertial axes.
-
-    Args:
-        positions: (T, 3) on a straight line, m.
-        rotations: (T, 3, 3) on the shortest turn, or (0, 3, 3).
-        share: (T,) of the time.
-        span: s.
-    """
+def _twists(positions: Array, rotations: Array, share: Array, span: float) -> Array:
     rate = quintic(share)[1][:, np.newaxis] / span
     twists = np.zeros((len(share), 6))
     twists[:, :3] = (positions[-1] - positions[0]) * rate
@@ -257,109 +275,3 @@ def twists_along(positions: Array, rotations: Array, share: Array, span: float) 
         axis, angle = turn_between(first, last)
         twists[:, 3:] = product(rotations[0], axis) * angle * rate
     return twists
-
-
-class ToolPose(NamedTuple):
-    """Pose of a tool on inertial axes, with the base's attitude held."""
-
-    position: Array
-    """(3,) m, from the robot's centre of mass."""
-    from_base: Array
-    """(3,) m, from the base's frame."""
-    rotation: Array
-    """(3, 3) from the tool's frame."""
-    jacobian: Array
-    """(6, N) ``J_held``."""
-    free_jacobian: Array
-    """(6, N) ``J_g``."""
-
-
-class ToolFollower:
-    """The tool of a robot whose joints are all actuated, and the joints that lead it."""
-
-    def __init__(self, robot: Robot, tool: str | None) -> None:
-        """Take a tool by name; None: the first.
-
-        Raises:
-            InputError: there is no such tool.
-        """
-        self._robot, self._mounted = robot, mounted_tool(robot, tool)
-        self._work = ToolKinematics.allocate(robot.joint_count)
-        self._rows = list(robot.model_rows)
-
-    def pose(self, quaternion: Array, joints: Array) -> ToolPose:
-        """Return the pose of the tool at an attitude (4,) and joint positions (N,)."""
-        columns, work = np.empty(len(joints)), self._work
-        columns[self._rows] = joints
-        tool_kinematics_into(self._robot.model, quaternion, columns, *self._mounted, work)
-        return ToolPose(
-            work.position.copy(),
-            work.position + work.centre_of_mass,
-            work.rotation.copy(),
-            work.held[:, self._rows],
-            work.free[:, self._rows],
-        )
-
-    def coupling(self, quaternion: Array, joints: Array) -> Array:
-        """Return (3, N) ``H~_wm``: angular momentum by joint velocities, see `ToolKinematics`."""
-        self.pose(quaternion, joints)
-        return self._work.coupling[:, self._rows]
-
-    def follow(
-        self,
-        quaternions: Array,
-        positions: Array,
-        rotations: Array,
-        from_base: bool,
-        start: Array,
-        momentum_weight: float = 0.0,
-    ) -> tuple[Array, int]:
-        """Return joint positions (K, N), and how many of the K poses were reached.
-
-        Args: see `follow_path_into`; ``start`` (N,) is the posture at the first pose.
-        """
-        out, first = np.zeros((len(positions), len(start))), np.empty(len(start))
-        first[self._rows] = start
-        reached = follow_path_into(
-            self._robot.model,
-            quaternions,
-            positions,
-            rotations,
-            from_base,
-            *self._mounted,
-            momentum_weight,
-            first,
-            self._work,
-            out,
-        )
-        return out[:, self._rows], int(reached)
-
-    def follow_free(
-        self,
-        positions: Array,
-        rotations: Array,
-        twists: Array,
-        spacing: float,
-        start: Array,
-        quaternion: Array,
-    ) -> tuple[Array, Array, float]:
-        """Return joint positions (K, N) and attitudes (K, 4) of a free base, and the largest error.
-
-        For the arguments see `follow_free_path_into`; ``start`` (N,) and ``quaternion`` (4,) are
-        those at the first pose.
-        """
-        count = len(positions) // 2 + 1
-        out, attitudes = np.empty((count, len(start))), np.empty((count, 4))
-        out[0, self._rows], attitudes[0] = start, quaternion
-        error = follow_free_path_into(
-            self._robot.model,
-            positions,
-            rotations,
-            twists,
-            spacing,
-            *self._mounted,
-            FreeBase.allocate(self._robot.joint_count),
-            out,
-            attitudes,
-        )
-        return out[:, self._rows], attitudes, float(error)

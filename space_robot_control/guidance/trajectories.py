@@ -36,11 +36,7 @@ class TrajectoryTable:
     """A trajectory of joints and base, by cubic splines through its rows."""
 
     def __init__(self, columns: Columns, joint_names: Sequence[str]) -> None:
-        """Check the columns and make the splines.
-
-        Raises:
-            InputError: a column is missing, times do not rise, or rates do not belong to positions.
-        """
+        """Check the columns and make the splines."""
         missing = [name for name in (TIME, *joint_names) if name not in columns]
         if missing:
             raise InputError(f"trajectory: {missing_column(short(missing[0]), columns)}")
@@ -94,9 +90,6 @@ class TrajectoryTable:
         """Return the courses of joints and base from a time, posture and motion of the base on.
 
         Without columns of its attitude the base goes on as it moves.
-
-        Raises:
-            InputError: the trajectory begins elsewhere.
         """
         away = np.abs(self._joints.values[0] - joints)
         if away.max() > SAME_PLACE:
@@ -115,6 +108,7 @@ class TrajectoryTable:
         if base.course is not None:
             motion = base.course.at(np.array([begin]))[0]
             sign = 1.0 if product(first, motion[:4]) >= 0.0 else -1.0
+            # it goes on with the base's rate: qdot = q (0, omega) / 2
             rate = 0.5 * sign * multiplied(motion[:4], np.append(0.0, motion[4:7]))
             attitude = CubicSpline(self._time, attitude.values, rate, np.zeros(4))
         return course, AttitudeCourse(begin, attitude)
@@ -131,6 +125,7 @@ def _quaternions(columns: Columns) -> Array:
             "1.001 is allowed"
         )
     rows = unit_rows(rows)
+    # q and -q are one attitude, but a spline from one to the other would pass near zero
     products = dot_rows(rows[1:], rows[:-1])
     rows[1:] *= np.cumprod(np.where(products < 0.0, -1.0, 1.0), axis=0)
     return rows

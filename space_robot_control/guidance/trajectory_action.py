@@ -6,7 +6,7 @@ Its type is in control_msgs; without that package there is no action.
 from __future__ import annotations
 
 import time
-from contextlib import closing, nullcontext
+from contextlib import closing
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -40,52 +40,47 @@ MOST_AT_ONCE = 1_000
 OF_OTHER_JOINTS = ("component_path_tolerance", "component_goal_tolerance")
 
 
-class MeasuredJoints:
-    """The joints as /joint_states reports them while a goal with tolerances is followed."""
-
-    def __init__(self, node: ManagedNode[Any], names: RobotNames) -> None:
-        """Subscribe."""
-        assert node.settings is not None
-        self._subscription = RawSubscription(node, topics.JOINT_STATES, PolledCallbackGroup())
-        self._codec = CompiledCodec(describe(topics.JOINT_STATES, names, node.settings.timebase))
-        self._motors, self._all = len(names.joints), len(names.all_joints)
-
-    def take(self) -> tuple[Array, Array]:
-        """Return times (T,), s, and positions and velocities (T, 2, n), of what has come."""
-        times: list[float] = []
-        rows: list[tuple[Array, Array]] = []
-        n = self._motors
-        values = np.zeros(2 * self._all + n)
-        while len(times) < MOST_AT_ONCE and (data := self._subscription.take()) is not None:
-            try:
-                times.append(self._codec.decode(data, values) / 1e9)
-            except MessageError:  # of another robot
-                continue
-            rows.append((values[:n].copy(), values[self._all : self._all + n].copy()))
-        return np.array(times), np.array(rows).reshape(-1, 2, n)
-
-    def close(self) -> None:
-        """End the subscription."""
-        self._subscription.close()
-
-
 class Pursuit:
-    """The trajectory of a goal, and how its joints follow it."""
+    """The trajectory of a goal, and how the joints follow it, as /joint_states reports them."""
 
-    def __init__(self, piece: Piece, tolerances: GoalTolerances, names: RobotNames) -> None:
-        self.piece, self.tolerances, self._names = piece, tolerances, names
-        self.measured: MeasuredJoints | None = None
-        """None: without tolerances nothing is measured."""
+    def __init__(
+        self, node: ManagedNode[Any], piece: Piece, tolerances: GoalTolerances, names: RobotNames
+    ) -> None:
+        """Subscribe, if there are tolerances: else nothing is measured."""
+        assert node.settings is not None
+        self.piece, self._tolerances, self._names = piece, tolerances, names
+        self._subscription: RawSubscription | None = None
+        if tolerances.are_given:
+            self._subscription = RawSubscription(node, topics.JOINT_STATES, PolledCallbackGroup())
+        self._codec = CompiledCodec(describe(topics.JOINT_STATES, names, node.settings.timebase))
         self._verdict: GoalVerdict | None = None
 
     def verdict(self, time: float) -> GoalVerdict | None:
         """Return how the goal ends at simulated time ``time``, s; None: it goes on."""
-        if self.measured is None:
+        if self._subscription is None:
             return GoalVerdict("SUCCESSFUL") if time >= self.piece.end else None
         if self._verdict is None:
-            times, states = self.measured.take()
-            self._verdict = self.tolerances.evaluate(self.piece, self._names.joints, times, states)
+            measured = self._measured(self._subscription)
+            self._verdict = self._tolerances.evaluate(self.piece, self._names.joints, *measured)
         return self._verdict
+
+    def _measured(self, subscription: RawSubscription) -> tuple[Array, Array]:
+        n, all_joints = len(self._names.joints), len(self._names.all_joints)
+        times: list[float] = []
+        states: list[tuple[Array, Array]] = []
+        values = np.zeros(2 * all_joints + n)
+        while len(times) < MOST_AT_ONCE and (data := subscription.take()) is not None:
+            try:
+                times.append(self._codec.decode(data, values) / 1e9)
+            except MessageError:  # of another robot
+                continue
+            states.append((values[:n].copy(), values[all_joints : all_joints + n].copy()))
+        return np.array(times), np.array(states).reshape(-1, 2, n)
+
+    def close(self) -> None:
+        """End the subscription."""
+        if self._subscription is not None:
+            self._subscription.close()
 
 
 class TrajectoryAction:
@@ -96,15 +91,9 @@ class TrajectoryAction:
     to rest.
     """
 
-    def __init__(self, node: ManagedNode[Any], action: Any, motions: MissionChanges) -> None:
-        """Offer the action.
-
-        Args:
-            node: of the mission.
-            action: control_msgs.action.FollowJointTrajectory.
-            motions: of the mission.
-        """
-        self._node, self._action, self._motions = node, action, motions
+    def __init__(self, node: ManagedNode[Any], action: Any, changes: MissionChanges) -> None:
+        """Offer the action, a control_msgs.action.FollowJointTrajectory."""
+        self._node, self._action, self._changes = node, action, changes
         self._goal: ServerGoalHandle | None = None
         """The last one."""
         self._is_closed = False
@@ -131,22 +120,22 @@ class TrajectoryAction:
                 getattr(request, name) for name in OF_OTHER_JOINTS
             ):
                 raise InputError("multi_dof_trajectory and its tolerances are not for this robot")
-            self._tolerances = GoalTolerances.read(request, self._motions.names.joints)
+            self._tolerances = GoalTolerances.read(request, self._changes.names.joints)
         except InputError as error:
-            self._motions.refuse(str(error))
+            self._changes.refuse(str(error))
             return GoalResponse.REJECT
         try:
-            self._motions.follow(request.trajectory)
+            self._changes.follow(request.trajectory)
         except InputError:
             return GoalResponse.REJECT
         if any(e.acceleration > 0.0 for e in (*request.path_tolerance, *request.goal_tolerance)):
-            self._motions.warn("accelerations are not measured: their tolerances are ignored")
+            self._changes.warn("accelerations are not measured: their tolerances are ignored")
         return GoalResponse.ACCEPT
 
     def _start(self, goal: ServerGoalHandle) -> None:
-        self._goal, piece = goal, self._motions.latest
+        self._goal, piece = goal, self._changes.latest
         assert piece is not None
-        pursuit = Pursuit(piece, self._tolerances, self._motions.names)
+        pursuit = Pursuit(self._node, piece, self._tolerances, self._changes.names)
         goal.execute(partial(self._lead, pursuit=pursuit))
 
     def _cancel(self, goal: ServerGoalHandle) -> CancelResponse:
@@ -154,24 +143,22 @@ class TrajectoryAction:
             return CancelResponse.REJECT
         return CancelResponse.ACCEPT if self._stop("to cancel a goal") else CancelResponse.REJECT
 
-    def _stop(self, what: str) -> bool:
+    def _stop(self, purpose: str) -> bool:
         try:
-            self._motions.stop()
+            self._changes.stop()
         except InputError as error:  # a joint would leave its limits meanwhile
-            self._motions.warn(f"refused {what}: {error}")
+            self._changes.warn(f"refused {purpose}: {error}")
             return False
         return True
 
     async def _lead(self, goal: ServerGoalHandle, pursuit: Pursuit) -> Any:
-        if pursuit.tolerances.are_given:
-            pursuit.measured = MeasuredJoints(self._node, self._motions.names)
-        with closing(pursuit.measured) if pursuit.measured else nullcontext():
+        with closing(pursuit):
             while (verdict := self._verdict(goal, pursuit)) is None:
                 goal.publish_feedback(self._feedback())
                 await self._pause(goal, pursuit)
         code, text = verdict
         if code.endswith("VIOLATED"):
-            self._motions.warn(f"a goal is aborted, the reference is brought to rest: {text}")
+            self._changes.warn(f"a goal is aborted, the reference is brought to rest: {text}")
             self._stop("to bring the reference to rest")
         if code != "SUCCESSFUL":
             goal.abort()
@@ -190,14 +177,14 @@ class TrajectoryAction:
             return GoalVerdict("INVALID_GOAL", "the mission has ended")
         if goal.is_cancel_requested:
             return GoalVerdict("SUCCESSFUL", "the reference is brought to rest")
-        if self._motions.latest is not pursuit.piece:
+        if self._changes.latest is not pursuit.piece:
             return GoalVerdict("INVALID_GOAL", "another motion took its place")
-        return pursuit.verdict(self._motions.time)
+        return pursuit.verdict(self._changes.time)
 
     def _feedback(self) -> Any:
-        motions, feedback = self._motions, self._action.Feedback()
-        feedback.header.stamp = Time(nanoseconds=round(motions.time * 1e9)).to_msg()
-        feedback.joint_names = list(motions.names.joints)
+        changes, feedback = self._changes, self._action.Feedback()
+        feedback.header.stamp = Time(nanoseconds=round(changes.time * 1e9)).to_msg()
+        feedback.joint_names = list(changes.names.joints)
         desired = feedback.desired
-        desired.positions, desired.velocities, desired.accelerations = motions.joints().tolist()
+        desired.positions, desired.velocities, desired.accelerations = changes.joints().tolist()
         return feedback

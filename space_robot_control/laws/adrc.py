@@ -50,10 +50,12 @@ def disturbance_rejection(signals: Signals, gains: Gains, memory: Memory, period
         away, by_force = 1.0 - beta, signals.applied_force[i] / inertia
         is_first = np.isnan(z_1[i])
         acceleration, last_rate = z_3[i] + by_force, z_2[i] + signals.rate_step[i]
+        # rhodd = z_3 + F_S / J over the tick, exactly for a constant force
         predicted = (
             z_1[i] + signals.rho_step[i] + period * (last_rate + 0.5 * period * acceleration)
         )
         innovation = rho[i] - predicted
+        # gains of the current observer with three poles at beta, Miklosovic et al. 2006
         of_rate = 1.5 * away * away * (1.0 + beta) / period
         of_disturbance = away * away * away / (period * period)
         new_rate = last_rate + period * acceleration + of_rate * innovation
@@ -62,6 +64,7 @@ def disturbance_rejection(signals: Signals, gains: Gains, memory: Memory, period
         z_1[i] = where(is_first, rho[i], predicted + (1.0 - beta * beta * beta) * innovation)
         z_2[i] = where(is_first, rate[i], new_rate)
         z_3[i] = where(is_first, begun, new_disturbance)
+        # against the observed motion: rho_d - z_1, rhodot_d - z_2
         position_error = signals.error[i] + rho[i] - z_1[i]
         rate_error = signals.error_rate[i] + rate[i] - z_2[i]
         omega_c = gains.omega_c[i]

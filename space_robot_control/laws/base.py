@@ -16,8 +16,9 @@ from numpy.typing import NDArray
 
 from space_robot_model.dynamics.model import Model
 from space_robot_model.dynamics.rho_space import RhoSpaceModel
+from space_robot_model.dynamics.tool_kinematics import ToolKinematics
 from space_robot_model.robot import Robot
-from space_robot_model.robot.kinematics import ToolState, tool_state
+from space_robot_model.robot.kinematics import tool_state
 from space_robot_msgs_py.compiled.kernels import RecordFunction, keep_types
 from space_robot_msgs_py.compiled.records import (
     Block,
@@ -53,7 +54,7 @@ class SignalsView(RecordView):
     robot: Robot
     """The robot as the controller knows it, without payload."""
 
-    def tool_state(self, tool: str | None = None) -> ToolState:
+    def tool_state(self, tool: str | None = None) -> ToolKinematics:
         """Return pose and Jacobians of a tool of the nominal robot; see `Signals.tool_state`."""
         signals: Any = self
         return tool_state(self.robot, signals.quaternion, signals.joint_positions, tool)
@@ -88,7 +89,7 @@ class Signals(Record):
     rho: Array = per_axis("rho = [eps_e, theta]")
     rho_rate: Array = per_axis("rhodot")
     rho_step: Array = per_axis("step of rho since the last tick by one of the reference")
-    """Zero while the base's reference goes on where it was; no torque causes it."""
+    """Zero while the base's reference moves continuously; no torque causes it."""
     rate_step: Array = per_axis("step of rhodot by the same")
     applied_force: Array = per_axis("F_S applied over the last interval", "N m")
     paired_force: Array = per_axis("the same through the low-pass of the time-delay pair", "N m")
@@ -108,7 +109,7 @@ class Signals(Record):
     robot: Robot
     """The same robot; for laws in Python only."""
 
-    def tool_state(self, tool: str | None = None) -> ToolState:
+    def tool_state(self, tool: str | None = None) -> ToolKinematics:
         """Return pose and Jacobians of a tool of the nominal robot; for laws in Python only.
 
         Args:
@@ -227,6 +228,12 @@ class ControlLaw(RecordOwner, ABC):
         return self.uses_model or self.estimate == NOMINAL_INERTIA
 
     @property
+    def needs(self) -> tuple[Array, int, bool]:
+        """``h_bar``, `estimate` and `needs_model`: what the signals have to hold."""
+        estimate = self.estimate  # once: it takes a microsecond
+        return self.h_bar, estimate, self.uses_model or estimate == NOMINAL_INERTIA
+
+    @property
     def adds_inertia(self) -> bool:
         """True if ``H_S u`` is added to the law's force, see `force_of`."""
         return self.estimate == NOMINAL_INERTIA and self.h_bar.size > 0
@@ -241,7 +248,7 @@ class ControlLaw(RecordOwner, ABC):
 
 
 class SomeGains(Record):
-    """Common layout of the gains of any law: at least one gain."""
+    """Common beginning of the gains of all laws, as which compiled loops see them."""
 
     first: Array = per_axis("first gain")
 
@@ -285,11 +292,7 @@ class CompiledLaw(ControlLaw):
 
     @classmethod
     def function(cls, width: int = 1) -> RecordFunction:
-        """Return the kernel, compiled for this law's records of numbers of a width.
-
-        Raises:
-            InputError: it cannot be compiled for that width.
-        """
+        """Return the kernel, compiled for this law's records of numbers of a width."""
         own: list[Any] = [cls.gains_type, cls.memory_type]  # classes are hashable
         return _compiled(cls.kernel, *own, width)
 
@@ -299,8 +302,7 @@ class CompiledLaw(ControlLaw):
         n = len(self.memory.s) - 3
         gains = prefix(self.gains_block, SomeGains.dtype(n))
         memory = prefix(self.memory_block, LawMemory.dtype(n))
-        needs = self.h_bar, self.estimate, self.needs_model, self.adds_inertia
-        return LawCode(self.function(), gains, memory, *needs)
+        return LawCode(self.function(), gains, memory, *self.needs, self.adds_inertia)
 
     def force(self, signals: Signals) -> Array:
         """Run the kernel; ``signals`` is a `Signals.view`."""
@@ -331,14 +333,13 @@ def force_of(law: ControlLaw, signals: Signals, tick: int) -> Array:
         tick: number of the tick, for error messages.
 
     Raises:
-        LawError: its code raised an error or called ``sys.exit``, or the returned value is not
-            an array with one number per axis.
+        LawError: its code failed, or did not return an array with one number per axis.
     """
     try:
         force = law.force(signals)
     except SpaceRobotError:
         raise
-    except BaseException as error:
+    except BaseException as error:  # a law may be the user's own, and call `sys.exit`
         if _is_of_user(error):
             raise
         place = traceback.extract_tb(error.__traceback__)[-1]

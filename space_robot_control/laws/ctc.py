@@ -19,8 +19,10 @@ class Gains(LawGains):
 def computed_torque(signals: Signals, gains: Gains, memory: LawMemory, period: float) -> None:
     """Compute one tick: u of (31), force of (30)."""
     e, edot, rhodd_d = signals.error, signals.error_rate, signals.acceleration_desired
+    # u_PD of (31)
     for i in range(e.size):
         memory.u[i] = rhodd_d[i] + gains.k_d[i] * edot[i] + gains.k_p[i] * e[i]
+    # F = H_S u_PD + c_S, (30)
     force_for(signals.nominal, memory.u, signals.nominal.bias, memory.force)
 
 

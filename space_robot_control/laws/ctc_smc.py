@@ -27,8 +27,10 @@ def computed_torque_sliding_mode(
     e, edot, rhodd_d = signals.error, signals.error_rate, signals.acceleration_desired
     lam, s, u, force = gains.lambda_, memory.s, memory.u, memory.force
     for i in range(e.size):
+        # s = edot + lambda e, (38)
         s[i] = edot[i] + lam[i] * e[i]
         u[i] = rhodd_d[i] + lam[i] * edot[i]
+    # F = H_S u + c_S + g sat(s, Delta), (57)
     force_for(signals.nominal, u, signals.nominal.bias, force)
     for i in range(e.size):
         force[i] += gains.g[i] * saturation(s[i], gains.delta[i])

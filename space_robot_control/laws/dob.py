@@ -47,14 +47,17 @@ def disturbance_observer(signals: Signals, gains: Gains, memory: Memory, period:
     force, rate, smooth = signals.applied_force, signals.rho_rate, memory.smooth
     for i in range(e.size):
         inertia = gains.inertia[i]
+        # g / (s + g) by backward differences; ``momentum`` is g J of the discrete observer
         share = gains.bandwidth[i] * period / (1.0 + gains.bandwidth[i] * period)
         momentum = share / period * inertia
+        # the reference's step moves rhodot without a force
         last_rate = memory.last_rate[i] + signals.rate_step[i]
         begun = force[i] - inertia * rhodd_d[i] + momentum * rate[i]
         new = smooth[i] + share * (force[i] + momentum * last_rate - smooth[i])
         smooth[i] = where(np.isnan(smooth[i]), begun, new)
         memory.last_rate[i] = rate[i]
         disturbance = smooth[i] - momentum * rate[i]
+        # u_PD of (31)
         memory.u[i] = rhodd_d[i] + gains.k_d[i] * edot[i] + gains.k_p[i] * e[i]
         memory.force[i] = inertia * memory.u[i] + disturbance
 

@@ -24,8 +24,10 @@ class Gains(LawGains):
 def incremental_inversion(signals: Signals, gains: Gains, memory: LawMemory, period: float) -> None:
     """Compute one tick: u of (31), force of (37) with H_S in place of h_bar."""
     e, edot, rhodd_d = signals.error, signals.error_rate, signals.acceleration_desired
+    # u_PD of (31)
     for i in range(e.size):
         memory.u[i] = rhodd_d[i] + gains.k_d[i] * edot[i] + gains.k_p[i] * e[i]
+    # F = H_S u_PD + N_hat, (37) with H_S
     force_for(signals.nominal, memory.u, signals.n_hat, memory.force)
 
 

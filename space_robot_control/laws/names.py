@@ -89,6 +89,7 @@ def import_file(path: Path) -> ModuleType:
         spec = importlib.util.spec_from_file_location(name, path.resolve())
         assert spec
         assert spec.loader
+        # in sys.modules while it is executed: dataclasses and pickle look there
         sys.modules[name] = module = importlib.util.module_from_spec(spec)
         try:
             spec.loader.exec_module(module)
@@ -116,9 +117,6 @@ def import_named(
         is_wanted: True for an object of this kind.
         advice: how to name one, for errors.
         derived: what all of this kind have in common, for errors: " derived from ControlLaw".
-
-    Raises:
-        InputError: it cannot be imported, or is of another kind.
     """
     module, _, attribute = name.rpartition(":")
     file = law_file(name)

@@ -33,21 +33,23 @@ class Memory(LawMemory):
 def feedforward(signals: Signals, gains: Gains, memory: Memory, period: float) -> None:
     """Compute one tick: u, the predicted acceleration, and the force; s is not used.
 
-    With blocks b (base) and q (joints) of H_S and c_S:
-    ``u_b = rhodd_d,b``, ``H_qq u_q = F_q - c_q - H_qb u_b``, ``F_b += H_bb u_b + H_bq u_q + c_b``.
+    H_S and c_S have blocks b (base) and q (joints).
     """
     inertia, bias = signals.nominal.inertia, signals.nominal.bias
     u, force, axes = memory.u, memory.force, signals.error.size
     for i in range(axes):
         force[i] = gains.k_p[i] * signals.error[i] + gains.k_d[i] * signals.error_rate[i]
+    # u_b = rhodd_d,b
     for k in range(3):
         u[k] = signals.acceleration_desired[k]
+    # H_qq u_q = F_q - c_q - H_qb u_b
     for i in range(3, axes):
         u[i] = force[i] - bias[i]
         for k in range(3):
             u[i] -= inertia[i, k] * u[k]
     cholesky_into(inertia, 3, memory.factor)
     solve_cholesky(memory.factor, u[3:])
+    # F_b += H_bb u_b + H_bq u_q + c_b
     for k in range(3):
         force[k] += bias[k]
         for j in range(axes):

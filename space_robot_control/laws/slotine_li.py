@@ -35,7 +35,7 @@ from .base import Array, CompiledLaw, LawGains, LawMemory, Signals, per_axis
 SLOWEST_ADAPTATION = 1e-30
 """Smallest rate in 1/J that counts as such; 0 in ``gamma`` stands for it, and nothing adapts."""
 LARGEST_SPREAD = 0.99
-"""Of what counts: the lightest robot has a mass."""
+"""Larger values of ``spread`` count as this: the lightest robot has a mass."""
 
 
 class Gains(LawGains):
@@ -96,9 +96,11 @@ def slotine_li(signals: Signals, gains: Gains, memory: Memory, period: float) ->
     if any_lane(is_new):
         bound_estimate(signals.model, gains, memory)
     for i in range(e.size):
+        # v = rhodot_d + lambda e is s + rhodot; u is vdot
         s[i] = edot[i] + gains.lambda_[i] * e[i]
         v[i] = s[i] + rate[i]
         u[i] = signals.acceleration_desired[i] + gains.lambda_[i] * edot[i]
+    # F_S = Y pi + K_D s
     near, desired = signals.attitude_error, signals.reference
     vectors_into(signals.model, near, signals.joint_positions, work)
     if uniform(signals.base_is_free) == 0.0:
@@ -144,6 +146,7 @@ def let_base_float(
         work.v[i], work.v_rate[i] = memory.v[i], memory.u[i]
     estimated_force(signals.model, memory)
     multiply(memory.estimate, work.vectors, inertia)
+    # rotational inertia of the whole estimated robot, from its second moments
     xx = yy = zz = xy = xz = yz = 0.0
     for k in range(inertia.shape[1]):
         x, y, z = column(work.vectors, k)
@@ -152,6 +155,7 @@ def let_base_float(
     mobility = inverse_symmetric((yy + zz, xx + zz, xx + yy, -xy, -xz, -yz))
     for i in range(3):
         memory.force[i] += 0.25 * gains.k_d[i] * work.s[i]
+    # v0dot by which the base's row of Y pi + K_0 s0 is zero
     acceleration = transform_symmetric(mobility, vector(memory.force, 0))
     store(scale(acceleration, -1.0), work.v_rate, 0)
     estimated_force(signals.model, memory)
@@ -217,6 +221,7 @@ def adapt(memory: Memory, period: float) -> None:
         for k in range(s.shape[1]):
             of_s += s[c, k] * metric_s[c, k]
             of_a += a[c, k] * metric_a[c, k]
+    # length of the step in the norm of Gamma^-1, at most (Schwarz)
     length = period * np.sqrt(abs(of_s)) * np.sqrt(abs(of_a))
     is_finite = np.isfinite(length)
     step = 0.5 * period * where(length > memory.width, memory.width / length, 1.0)
@@ -229,6 +234,7 @@ def adapt(memory: Memory, period: float) -> None:
             change += sk[1] * metric_a[1, c] + ak[1] * metric_s[1, c]
             change += sk[2] * metric_a[2, c] + ak[2] * metric_s[2, c]
             row[c] = where(is_finite, row[c] + step * change, row[c])
+    # projected onto what is lighter than the heaviest robot, then heavier than the lightest
     root, work, axes = memory.root, memory.work, memory.axes
     move_to_side(memory.estimate, memory.upper, -1.0, root, work, axes)
     move_to_side(memory.estimate, memory.lower, 1.0, root, work, axes)

@@ -25,8 +25,10 @@ def time_delay_sliding_mode(
     e, edot, rhodd_d = signals.error, signals.error_rate, signals.acceleration_desired
     h_bar, lam, s, u = gains.h_bar, gains.lambda_, memory.s, memory.u
     for i in range(e.size):
+        # s = edot + lambda e, (38)
         s[i] = edot[i] + lam[i] * e[i]
         u[i] = rhodd_d[i] + lam[i] * edot[i]
+        # F = h_bar u + N_hat + g sign(s), (59)
         memory.force[i] = h_bar[i] * u[i] + signals.n_hat[i] + gains.g[i] * np.sign(s[i])
 
 

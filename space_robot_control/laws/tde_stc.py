@@ -32,9 +32,13 @@ def time_delay_super_twisting(
     e, edot, rhodd_d = signals.error, signals.error_rate, signals.acceleration_desired
     lam, k_1, s, u, psi = gains.lambda_, gains.k_1, memory.s, memory.u, memory.psi
     for i in range(e.size):
+        # s = edot + lambda e, (38)
         s[i] = edot[i] + lam[i] * e[i]
+        # psidot = K_2 sign(s) of (40), whose psi has the other sign; s is held over the tick
         psi[i] += gains.k_2[i] * np.sign(s[i]) * period
+        # u_STC of (42)
         u[i] = rhodd_d[i] + lam[i] * edot[i] + k_1[i] * np.sqrt(abs(s[i])) * np.sign(s[i]) + psi[i]
+        # F = h_bar u_STC + N_hat, (41)
         memory.force[i] = gains.h_bar[i] * u[i] + signals.n_hat[i]
 
 

@@ -33,12 +33,15 @@ def time_delay_terminal_sliding_mode(
     e, edot, rhodd_d = signals.error, signals.error_rate, signals.acceleration_desired
     k_p, k_d, s, u, last_edot = gains.k_p, gains.k_d, memory.s, memory.u, memory.last_edot
     for i in range(e.size):
-        change = edot[i] - last_edot[i]  # the integral of edd is the change of edot
+        # s = integral of (edd + K_D edot + K_P e), below (60); that of edd is the change of edot
+        change = edot[i] - last_edot[i]
         change += (k_d[i] * edot[i] + k_p[i] * e[i]) * period
         s[i] += where(np.isnan(last_edot[i]), 0.0, change)
         last_edot[i] = edot[i]
+        # u_PD of (31), and K_1 Lambda(s) sign(s) as in (40)
         u_pd = rhodd_d[i] + k_d[i] * edot[i] + k_p[i] * e[i]
         u[i] = u_pd + gains.k_1[i] * np.sqrt(abs(s[i])) * np.sign(s[i])
+        # F = h_bar (u_PD + K_1 Lambda(s) sign(s)) + N_hat, (60)
         memory.force[i] = gains.h_bar[i] * u[i] + signals.n_hat[i]
 
 

@@ -127,6 +127,7 @@ def drift(filter: AttitudeFilter, duration: float) -> None:
 def propagate(filter: AttitudeFilter, tick: int, gyro: Array, period: float) -> None:
     """Go from the last tick to ``tick``, at which the gyro reports ``gyro`` (3,) rad/s."""
     _store(filter, tick, gyro, period)
+    # two attitudes, by one increment each: that of now, and that of k - D with the covariance
     delayed, scratch = tick - whole(filter.delay), filter.scratch
     _increment(filter, tick, period)
     compose(filter.present, scratch.quaternion, filter.present)
@@ -169,9 +170,10 @@ def propagate_covariance(filter: AttitudeFilter, period: float) -> None:
     for i in range(3):
         for j in range(3):
             same = 1.0 if i == j else 0.0
-            twice = rotation[i] * rotation[j] - same * square  # [r x]^2
+            twice = rotation[i] * rotation[j] - same * square  # [r x]^2 = r r^T - r^2 E
             transition[i, j] = same + 0.5 * twice
             transition[i, 3 + j] = -period * (same + twice / 6.0)
+    # -[r x] in A, and its integral in B
     for factor, first in ((1.0, 0), (-0.5 * period, 3)):
         transition[0, first + 1] += factor * z
         transition[0, first + 2] -= factor * y
@@ -185,6 +187,7 @@ def propagate_covariance(filter: AttitudeFilter, period: float) -> None:
             for k in range(6):
                 total += transition[i, k] * p[k, j]
             upper[i, j] = total
+    # Farrenkopf's Q: of the angle, between angle and bias, of the bias (below)
     angle = (filter.angle_walk + filter.rate_walk * period * period / 3.0) * period
     both = -0.5 * filter.rate_walk * period * period
     for i in range(3):
@@ -216,7 +219,8 @@ def observe_tracker(
         filter.reported[i] = where(is_new, quaternion[i], filter.reported[i])
     if not is_timed:
         return
-    is_first = is_new & (filter.stage == STARTED)  # of known age
+    # of known age: the filter begins anew from it
+    is_first = is_new & (filter.stage == STARTED)
     filter.stage = where(is_first, FILTERING, filter.stage)
     is_next = is_new & negated(is_first)
     is_used = update(filter, quaternion, is_next)
@@ -245,6 +249,7 @@ def update(filter: AttitudeFilter, quaternion: Array, is_asked: bool) -> bool:
         return is_asked
     p, noise, scratch = filter.covariance, filter.noise, filter.scratch
     gain, weighted, rest = scratch.gain, scratch.weighted, scratch.remaining
+    # S^-1 of the innovation's covariance S = H P H^T + R
     cosine = to_small_rotation(filter.quaternion, quaternion, filter.innovation)
     inverse = inverse_symmetric(
         (
@@ -260,6 +265,7 @@ def update(filter: AttitudeFilter, quaternion: Array, is_asked: bool) -> bool:
     innovation = vector(filter.innovation, 0)
     a, b, c = innovation
     distance = xx * a * a + yy * b * b + zz * c * c + 2.0 * (xy * a * b + xz * a * c + yz * b * c)
+    # Mahalanobis' distance; an innovation beyond 180 degrees is no small rotation
     is_within = (filter.gate <= 0.0) | ((cosine > 0.0) & (distance <= filter.gate))
     is_used: bool = is_asked & is_within
     if not any_lane(is_used):
@@ -272,7 +278,7 @@ def update(filter: AttitudeFilter, quaternion: Array, is_asked: bool) -> bool:
     for i in range(6):
         for j in range(3):
             weighted[i, j] = dot(vector(gain[i], 0), vector(noise[j], 0)) - rest[i, j]
-    for i in range(6):  # (E - K H) P (E - K H)^T + K R K^T, whose upper triangle is as good
+    for i in range(6):  # (E - K H) P (E - K H)^T + K R K^T, symmetric
         for j in range(i, 6):
             updated = rest[i, j] + dot(vector(weighted[i], 0), vector(gain[j], 0))
             p[i, j] = where(is_used, updated, p[i, j])

@@ -57,11 +57,7 @@ class Navigation(Record):
 
     @classmethod
     def build(cls, n: int, settings: NavigationFilterSettings, period: float) -> Navigation:
-        """Read the numbers of the settings, all of them given, for a robot of ``n`` joints.
-
-        Raises:
-            InputError: a number is invalid or does not fit the period.
-        """
+        """Read the numbers of the settings, all of them given, for a robot of ``n`` joints."""
         navigation = cls.allocate(n)
         delay = round(settings.tracker_delay / period)
         if delay > LONGEST_DELAY:
@@ -71,6 +67,7 @@ class Navigation(Record):
             )
         boresight = np.array(settings.tracker_boresight)
         length = direction_norm(boresight, "navigation_filter.tracker_boresight")
+        # covariance about the boresight b: across (E - b b^T) + about b b^T
         along = np.outer(boresight, boresight) / (length * length)
         across = settings.tracker_across * settings.tracker_across
         about = settings.tracker_about * settings.tracker_about
@@ -146,6 +143,7 @@ def _go_on(navigation: Navigation, tick: int, elapsed: int, measured: State, per
         _interpolate(navigation, measured.omega_base, step / elapsed)
         propagate(attitude, last + step, between, period)
     observe_tracker(attitude, tick, measured.quaternion, elapsed == 1, period)
+    # once more, since the tracker may have changed the bias
     for step in range(1, elapsed + 1):
         _interpolate(navigation, measured.omega_base, step / elapsed)
         _unbiased(navigation, between)

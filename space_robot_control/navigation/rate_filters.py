@@ -102,6 +102,7 @@ def jerk_density(bandwidth: float, angle_noise: float, rate_noise: float, period
     """Return q, rad2/s5, for a bandwidth, rad/s; noises: standard deviations (rate 0: none)."""
     of_angle = 1.0 / (angle_noise * angle_noise * period)
     of_rate = 1.0 / (rate_noise * rate_noise * period) if rate_noise > 0.0 else 0.0
+    # q = w^6 / (1/r_angle + w^2/r_rate)
     square = bandwidth * bandwidth
     return square * square * square / (of_angle + square * of_rate)
 
@@ -142,11 +143,10 @@ def steady_gains(
 ) -> Array:
     """Step the Riccati equation until it has settled; write the gains.
 
-    Plain arithmetic is used since results of library solvers differ between machines.
-
     Returns:
         (3, 3) covariance before an update.
     """
+    # plain arithmetic: results of library solvers differ between machines
     t, p = period, np.zeros((3, 3))
     noise, transition = np.zeros((3, 3)), np.eye(3)
     transition[0, 1], transition[1, 2], transition[0, 2] = t, t, 0.5 * t * t
@@ -228,6 +228,7 @@ def filter_joints(
         x += of_angle[0] * innovation
         v += of_angle[1] * innovation
         a += of_angle[2] * innovation
+        # the rate is taken after the angle: its noise is independent of the angle's
         innovation = rate[i] - v
         filter.angle[i] = x + of_rate[0] * innovation
         filter.rate[i] = v + of_rate[1] * innovation

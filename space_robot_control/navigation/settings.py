@@ -1,4 +1,4 @@
-"""Settings of navigation: the sensors as the filter believes them to be, and its smoothing."""
+"""Settings of navigation: the sensors that the filter assumes, and its smoothing."""
 
 from __future__ import annotations
 
@@ -29,8 +29,7 @@ MAY_BE_ZERO = (
     "rate_filter_hz",
     "joint_bandwidth_hz",
 )
-"""Numbers of which 0 says something; where it would say that something is perfect, it counts as
-not given."""
+"""Numbers that may be 0: none, or off. Of the others 0 would be a perfect sensor: not given."""
 UNIFORM = 1.0 / math.sqrt(12.0)
 """Standard deviation of the error of rounding to steps of 1."""
 LEAST_SIGMA = 1e-12
@@ -46,7 +45,7 @@ Corner = Annotated[float, Field(ge=0.0, le=1e5)]
 
 
 class NavigationFilterSettings(StrictModel):
-    """The sensors as the filter believes them to be, and how much it smooths."""
+    """The sensors that the filter assumes, and how much it smooths."""
 
     tracker_across: Sigma = Field(
         AS_THE_SENSORS,
@@ -106,9 +105,6 @@ def completed(
         settings: as they were given.
         sensors: a name in config/sensors, or a path; read only if a number is missing.
         period: s.
-
-    Raises:
-        InputError: there is no such file, or it is wrong.
     """
     missing = [name for name, value in settings.model_dump().items() if not _is_given(name, value)]
     if not missing:
@@ -126,6 +122,7 @@ def assumed_numbers(sensors: SensorSettings, period: float) -> Mapping[str, Any]
     tracker, gyro, encoders = sensors.star_tracker, sensors.gyro, sensors.encoders
     rounding = UNIFORM * tracker.step
     sample = norm((gyro.noise, UNIFORM * gyro.step)) * math.sqrt(period)
+    # rounding to steps counts as white noise of their standard deviation
     angle_step = 2.0 * math.pi / 2.0**encoders.bits if encoders.bits else 0.0
     joint_rate = norm((encoders.velocity_noise, UNIFORM * encoders.velocity_step))
     return {

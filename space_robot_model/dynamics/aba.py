@@ -28,12 +28,10 @@ the joint.
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.typing import NDArray
-
 from space_robot_msgs_py.compiled.kernels import kernel, subroutine
 from space_robot_msgs_py.compiled.lanes import all_lanes, any_lane, uniform, where, whole
 
+from ..elementary.matrices import Array
 from .algebra import (
     Matrix,
     Symmetric,
@@ -62,7 +60,6 @@ from .algebra import (
 from .kinematics import joint_axis, rotor_row
 from .model import Data, Model
 
-Array = NDArray[np.float64]
 Articulated = tuple[Symmetric, Matrix, Symmetric, Vector, Vector]
 """J, G and M of an articulated inertia, moment and force of its bias force."""
 
@@ -128,8 +125,10 @@ def aba(
         bias_force = add(bias_force, transform_transposed(coupling, angular))
         bias_force = add(bias_force, transform_symmetric(mass, linear))
         if uniform(model.rotor[j]) != 0.0:
+            # after the projection on the joint: the rotor is a leaf on the parent, not on this link
             inertia, bias_moment = _take_rotor(model, j, force, data, inertia, bias_moment)
         if uniform(model.continues[j]) == 0.0:
+            # the branch begins here: its sums wait in the row of the body that carries it
             row = data.inwards[whole(model.parent[j])]
             for k in range(6):
                 row[k] += inertia[k]
@@ -241,6 +240,7 @@ def _add_body(
             row[k] = 0.0
     inertia = add_symmetric(inertia, symmetric(data.inertia[i]))
     coupling = skew_added(coupling, vector(data.first_moment[i], 0))
+    # M of a rigid body is m E
     m = model.mass[i]
     mass = (mass[0] + m, mass[1] + m, mass[2] + m, mass[3], mass[4], mass[5])
     moment = add(moment, vector(data.bias[i], 0))
@@ -252,6 +252,7 @@ def _add_body(
 def _take_leaf(
     inertia: Symmetric, moment: Vector, axis: Vector, spin: float, torque: float, is_locked: bool
 ) -> tuple[Symmetric, Vector]:
+    # I - J a a^T; the moment -u a is on the right of the balance, so u a on the left
     if not all_lanes(is_locked):
         free = outer_subtracted(inertia, axis, scale(axis, spin))
         inertia = where(is_locked, inertia, free)
@@ -281,6 +282,7 @@ def _take_wheels(
         inertia, bias_moment = _take_leaf(
             inertia, bias_moment, axis, spin_inertia, force[6 + n + k], is_locked
         )
+    # w x h of all wheels together
     return inertia, add(bias_moment, cross(vector(omega_inertial, 0), momentum))
 
 
@@ -290,6 +292,7 @@ def _turn_wheels(model: Model, angular: Vector, force: Array, data: Data, out: A
     for k in range(whole(model.wheel_count)):
         of_base = dot(vector(data.wheel_axis[k], 0), angular)
         is_locked = data.locked[n + k] != 0.0
+        # Omegadot = u / J - a . wdot
         free = force[6 + n + k] / model.wheel_inertia[k] - of_base
         out[6 + n + k] = where(is_locked, 0.0, free)
         if any_lane(is_locked):
@@ -311,6 +314,7 @@ def _turn_rotor(
     model: Model, j: int, angular: Vector, force: Array, data: Data, out: Array
 ) -> None:
     row, ratio = rotor_row(model, j), model.gear_ratio[j]
+    # N^2 J thetadd_m + N J a . wdot = f
     coupled = model.rotor_inertia[j] * ratio * dot(joint_axis(model, j, data), angular)
     torque = force[6 + row] - coupled
     is_locked = data.locked[row] != 0.0

@@ -11,12 +11,10 @@ and clears.
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.typing import NDArray
-
 from space_robot_msgs_py.compiled.kernels import subroutine
 
-Array = NDArray[np.float64]
+from ..elementary.matrices import Array
+
 Vector = tuple[float, float, float]
 Symmetric = tuple[float, float, float, float, float, float]
 Matrix = tuple[float, float, float, float, float, float, float, float, float]

@@ -9,14 +9,13 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from space_robot_msgs_py.compiled.kernels import kernel, subroutine
 from space_robot_msgs_py.compiled.lanes import where
 
+from ..elementary.matrices import Array
 from .algebra import Vector, cross, scale
 
-Array = NDArray[np.float64]
 Quaternion = tuple[float, float, float, float]
 
 SINGULAR_ETA = 1e-6
@@ -46,7 +45,9 @@ def quaternion_rate(quaternion: Array, omega_inertial: Array, out: Array) -> Non
     """
     w, x, y, z = quaternion[0], quaternion[1], quaternion[2], quaternion[3]
     p, q, r = omega_inertial[0], omega_inertial[1], omega_inertial[2]
+    # (2)
     out[0] = -0.5 * (x * p + y * q + z * r)
+    # (1) on inertial axes: the skew term has the opposite sign
     out[1] = 0.5 * (w * p + z * q - y * r)
     out[2] = 0.5 * (w * q - z * p + x * r)
     out[3] = 0.5 * (w * r + y * p - x * q)
@@ -87,6 +88,7 @@ def attitude_error_into(desired: Array, actual: Array, out: Array) -> None:
     """
     eta, ex, ey, ez = relative(four(desired), four(actual))
     near = out[0] * eta + out[1] * ex + out[2] * ey + out[3] * ez
+    # nothing to be near to: the shorter of the two turns
     near = where(near == 0.0, eta, near)
     side = where(near < 0.0, -1.0, 1.0)
     out[0], out[1], out[2], out[3] = side * eta, side * ex, side * ey, side * ez
@@ -127,6 +129,7 @@ def relative(a: Quaternion, b: Quaternion) -> Quaternion:
 def columns_quaternion(a: Vector, b: Vector, c: Vector) -> Quaternion:
     """Return the unit quaternion of the rotation with these columns (Shepperd 1978)."""
     trace = a[0] + b[1] + c[2]
+    # from the largest component, so that nothing is divided by a small number
     if trace >= max(a[0], b[1], c[2]):
         q = (1.0 + trace, b[2] - c[1], c[0] - a[2], a[1] - b[0])
     elif a[0] >= max(b[1], c[2]):

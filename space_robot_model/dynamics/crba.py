@@ -6,12 +6,10 @@ have the same order. The sums of (8)-(10) are taken in inertial axes about the b
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.typing import NDArray
-
 from space_robot_msgs_py.compiled.kernels import kernel, subroutine
 from space_robot_msgs_py.compiled.lanes import uniform, whole
 
+from ..elementary.matrices import Array
 from .algebra import (
     Symmetric,
     Vector,
@@ -26,8 +24,6 @@ from .algebra import (
     vector,
 )
 from .model import Data, Model
-
-Array = NDArray[np.float64]
 
 
 @kernel
@@ -53,11 +49,13 @@ def crba(model: Model, data: Data, out: Array) -> None:
         angular, linear = vector(data.motion[j + 1], 0), vector(data.motion[j + 1], 3)
         linear_momentum = add(scale(linear, mass), cross(angular, moment))
         angular_momentum = add(transform_symmetric(inertia, angular), cross(moment, linear))
+        # momentum of the bodies beyond joint j: J_Tw and H_wphi of (10)
         column = out[6 + j]
         store(linear_momentum, column, 0)
         store(angular_momentum, column, 3)
         for r in range(6):  # the paper puts v0 before w0
             out[r, 6 + j] = column[r]
+        # H_M of (8): its part along each joint between here and the base; none on other branches
         i = j + 1
         while i > 0:
             angular, linear = vector(data.motion[i], 0), vector(data.motion[i], 3)
@@ -78,6 +76,7 @@ def crba(model: Model, data: Data, out: Array) -> None:
     mass += model.mass[0]
     moment = add(moment, vector(data.first_moment[0], 0))
     xx, yy, zz, xy, xz, yz = add_symmetric(inertia, symmetric(data.inertia[0]))
+    # H_B of (9)
     for k in range(3):
         out[k, k] = mass
     out[3, 3], out[4, 4], out[5, 5] = xx, yy, zz

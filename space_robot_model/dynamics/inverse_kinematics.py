@@ -14,17 +14,15 @@ order; joints by the generalised Jacobian, ``xdot = J_g thetadot``.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from space_robot_msgs_py.compiled.kernels import kernel, subroutine
 from space_robot_msgs_py.compiled.records import Record, nested, shaped
 
 from ..elementary.linear_algebra import least_squares_into, weighted_least_squares_into
+from ..elementary.matrices import Array
 from .attitude import quaternion_rate
 from .model import Model
 from .tool_kinematics import ToolKinematics, tool_kinematics_into
-
-Array = NDArray[np.float64]
 
 MOST_STEPS = 50
 TOLERANCE = 1e-12
@@ -102,6 +100,7 @@ def follow_path_into(
             if largest <= TOLERANCE:
                 is_reached = True
                 break
+            # v0 = 0 for positions from the base; P = 0 for those from the robot's centre of mass
             jacobian = work.joints if from_base else work.held
             if momentum_weight == 0.0:
                 least_squares_into(jacobian[:rows], error, scratch, step)
@@ -125,6 +124,7 @@ def _momentum_metric(coupling: Array, momentum_weight: float, out: Array) -> Non
             for k in range(3):
                 total += coupling[k, i] * coupling[k, j]
             out[i, j] = momentum_weight * total
+        # W = E + weight A^T A, positive definite for any posture
         out[i, i] += 1.0
 
 
@@ -223,8 +223,10 @@ def follow_free_path_into(
             if rows == 6:
                 rotation_error(rotations[row], tool.rotation, wanted[3:])
             for i in range(rows):
+                # written so that NaN, of a singular J_g, counts as the largest
                 if stage == 0 and not abs(wanted[i]) <= largest:
                     largest = abs(wanted[i])
+                # the error is fed back, so that those of the steps do not add up
                 wanted[i] = twists[row, i] + GAIN * wanted[i]
             least_squares_into(tool.free[:rows], wanted, scratch, work.rates[stage])
             _fill_attitude_rate(stage, work)

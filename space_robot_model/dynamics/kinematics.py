@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.typing import NDArray
-
 from space_robot_msgs_py.compiled.kernels import kernel, subroutine
 from space_robot_msgs_py.compiled.lanes import uniform, whole
 
 from ..elementary.functions import sin_cos
+from ..elementary.matrices import Array
 from .algebra import (
     Matrix,
     Symmetric,
@@ -32,8 +30,6 @@ from .algebra import (
 )
 from .attitude import rotation_matrix
 from .model import Data, Model
-
-Array = NDArray[np.float64]
 
 
 @kernel
@@ -61,6 +57,7 @@ def forward_kinematics(model: Model, quaternion: Array, joint_positions: Array, 
         y = (axes[1], axes[4], axes[7])
         z = (axes[2], axes[5], axes[8])
         offset, motion = model.offset[j], data.motion[j + 1]
+        # the fixed part of the Denavit-Hartenberg transform: Rx(alpha) Tx(a), with d along z
         x, y, z = rotate_axes(x, y, z, model.rotation[j])
         joint = add(joint, combine(x, y, z, offset[0], offset[1], offset[2]))
         if uniform(model.is_prismatic[j]) == 0.0:
@@ -135,6 +132,7 @@ def spatial_velocities(
         store(add(cross(v, angular), cross(w, linear)), coriolis, 3)
         if uniform(model.rotor[j]) != 0.0:
             _add_rotor_momentum_rate(model, j, w, joint_velocities, data)
+        # (11), (12), of the point of the body that is at the origin
         w, v = add(w, angular), add(v, linear)
         _momentum_rate(model, j + 1, w, v, data)
         if uniform(model.branches[j + 1]) != 0.0:
@@ -144,6 +142,7 @@ def spatial_velocities(
 @subroutine
 def _momentum_rate(model: Model, i: int, w: Vector, v: Vector, data: Data) -> None:
     moment = vector(data.first_moment[i], 0)
+    # (15), (16) without acceleration, about the origin: w x p and w x h + v x p
     linear = add(scale(v, model.mass[i]), cross(w, moment))
     angular = add(transform_symmetric(symmetric(data.inertia[i]), w), cross(moment, v))
     store(add(cross(w, angular), cross(v, linear)), data.bias[i], 0)
@@ -168,5 +167,6 @@ def _add_rotor_momentum_rate(
 ) -> None:
     spin = model.rotor_inertia[j] * model.gear_ratio[j] * velocities[rotor_row(model, j)]
     row = data.bias[whole(model.parent[j])]
+    # the spin is carried by the parent, and turns with it
     moment = cross(omega_parent, scale(joint_axis(model, j, data), spin))
     store(add(vector(row, 0), moment), row, 0)

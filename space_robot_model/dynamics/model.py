@@ -7,14 +7,10 @@ bodies 1..n are the links.
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.typing import NDArray
-
 from space_robot_msgs_py.compiled.records import Record, shaped
 from space_robot_msgs_py.samples import MOST_WHEELS
 
-Array = NDArray[np.float64]
-
+from ..elementary.matrices import Array
 
 MOST_JOINTS = 64
 """Maximum number of moving joints, actuated and passive. The algorithms' memory has this size, so

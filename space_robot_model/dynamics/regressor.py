@@ -36,14 +36,12 @@ In ``rho = [eps_e, theta]`` the same holds with ``w0 = J0^-1 epsdot_e + omega_d`
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.typing import NDArray
-
 from space_robot_msgs_py.compiled.kernels import kernel, subroutine
 from space_robot_msgs_py.compiled.lanes import uniform, where, whole
 from space_robot_msgs_py.compiled.records import Record, shaped
 
 from ..elementary.functions import sin_cos
+from ..elementary.matrices import Array
 from .algebra import (
     Matrix,
     Symmetric,
@@ -63,8 +61,6 @@ from .algebra import (
 )
 from .attitude import attitude_jacobian_inverse, rotation_matrix
 from .model import Model
-
-Array = NDArray[np.float64]
 
 THINNEST = 1e-8
 """Smallest second moment of a body relative to their sum: a plate or a wire without thickness gets
@@ -104,6 +100,7 @@ def mass_coordinates_into(model: Model, out: MassCoordinates) -> None:
                     own[c, k] = 0.0
                 own[c, 3 + 2 * j + c] = 1.0
         else:
+            # the vector of a prismatic joint is its travel
             own[3, 3 + 2 * j] = 1.0
 
 
@@ -130,6 +127,7 @@ def second_moments_into(
             axes = (frame[0, k], frame[1, k], frame[2, k])
             arm[k] = frame[3, k] + dot(axes, vector(model.com[i], 0)) - coordinates.centre[k]
         inertia = symmetric(model.inertia[i])
+        # second moments 1/2 tr(I) E - I, which are linear in I
         half = 0.5 * (inertia[0] + inertia[1] + inertia[2])
         half += _lacking_moment(inertia, half)
         moments = (
@@ -265,6 +263,7 @@ def take_rho(
     epsilon_rate = vector(rate, 0)
     w = transform_transposed(inverse, epsilon_rate)
     wv = transform_transposed(inverse, vector(v, 0))
+    # (2)
     eta_rate = -0.5 * dot(vector(quaternion, 1), w)
     # J0dot = (etadot E - skew(epsdot)) / 2 on the outer axes
     convective = scale(subtract(scale(wv, eta_rate), cross(epsilon_rate, wv)), 0.5)
@@ -291,6 +290,7 @@ def motions_into(model: Model, out: Regressor) -> None:
         row, first, z = out.motion[whole(model.parent[j])], 3 + 2 * j, vector(out.axes[j + 1], 6)
         rate, s, v = out.velocity[3 + j], out.s[3 + j], out.v[3 + j]
         w, ws, wv, a = vector(row, 0), vector(row, 3), vector(row, 6), vector(row, 9)
+        # d/dt (v z): the axis turns with the parent
         along = add(scale(z, out.v_rate[3 + j]), scale(cross(w, z), v))
         if uniform(model.is_prismatic[j]) == 0.0:
             w, a = add(w, scale(z, rate)), add(a, along)

@@ -22,12 +22,12 @@ from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
 from numpy.typing import NDArray
 
 from space_robot_msgs_py.compiled.kernels import kernel, subroutine
 from space_robot_msgs_py.compiled.records import Record, nested, shaped
 
+from ..elementary.matrices import Array
 from .algebra import (
     Symmetric,
     add,
@@ -44,7 +44,6 @@ from .kinematics import forward_kinematics, spatial_velocities
 from .model import Data, Model
 from .rnea import rnea_bias
 
-Array = NDArray[np.float64]
 Block = NDArray[Any]
 
 
@@ -114,6 +113,7 @@ def to_rho_space(
     for k in range(3):
         convective[k] = -0.25 * squared_rate * quaternion[1 + k]
     rotate_back(out.to_force, convective, moved)
+    # b = alpha_d + omega_d x w_e
     moved[0] -= alpha_desired[0] + d[1] * z - d[2] * y
     moved[1] -= alpha_desired[1] + d[2] * x - d[0] * z
     moved[2] -= alpha_desired[2] + d[0] * y - d[1] * x
@@ -121,6 +121,7 @@ def to_rho_space(
     for i in range(size):
         for k in range(3):
             bias[i] -= inertia[i, k] * moved[k]
+    # H_S of (25): J^-T from the left, then J^-1 from the right
     for j in range(size):
         for k in range(3):
             convective[k] = inertia[k, j]
@@ -160,6 +161,7 @@ def semi_floating_into(
 
 @kernel
 def _eliminate_translation(full: Array, full_bias: Array, inertia: Array, bias: Array) -> None:
+    # H11 = M E, so its inverse is a division
     total_mass = full[0, 0]
     for i in range(bias.size):
         bias[i] = full_bias[3 + i]
@@ -179,6 +181,7 @@ def eliminate_rotation(out: RhoSpaceModel) -> None:
     bias: zero acceleration gives zero force.
     """
     inertia, bias = out.inertia, out.bias
+    # H_f and c_f: the Schur complement of the base's rotation
     mobility, base_bias = _base_mobility(inertia), vector(bias, 0)
     for j in range(3, bias.size):
         turned = transform_symmetric(mobility, (inertia[0, j], inertia[1, j], inertia[2, j]))
@@ -217,6 +220,7 @@ def free_inverse_dynamics_along(
     for k in range(references.size):
         attitude, positions = references[k].quaternion, references[k].joint_positions
         rates, accelerations = references[k].joint_velocities, references[k].joint_accelerations
+        # first with the base at rest, for the momentum of the joints alone
         omega_base[:] = 0.0
         semi_floating_into(model, attitude, positions, omega_base, rates, work)
         momentum = (0.0, 0.0, 0.0)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
 from numpy.typing import NDArray
 
 from space_robot_msgs_py.compiled.kernels import kernel, subroutine
@@ -12,6 +11,7 @@ from space_robot_msgs_py.compiled.lanes import WIDTH, lane_of, uniform, whole
 from space_robot_msgs_py.compiled.records import Record, nested, shaped
 from space_robot_msgs_py.samples import Reference
 
+from ..elementary.matrices import Array
 from .algebra import (
     Vector,
     accumulate_wrench,
@@ -31,7 +31,6 @@ from .attitude import rotate, rotate_back
 from .kinematics import forward_kinematics, spatial_velocities
 from .model import Data, Model
 
-Array = NDArray[np.float64]
 Block = NDArray[Any]
 
 
@@ -60,11 +59,13 @@ def rnea_bias(model: Model, data: Data, out: Array) -> None:
         i = j + 1
         if uniform(model.continues[j]) == 0.0:
             angular, linear = load_motion(data.outwards[whole(model.parent[j])])
+        # (13), (14) with qdd = 0
         angular = add(angular, vector(data.coriolis[i], 0))
         linear = add(linear, vector(data.coriolis[i], 3))
         _add_force_of_body(model, i, angular, linear, data)
         if uniform(model.branches[i]) != 0.0:
             store_motion(angular, linear, data.outwards[i])
+    # inwards: (17), (18)
     moment = (0.0, 0.0, 0.0)
     force = (0.0, 0.0, 0.0)
     for j in range(whole(model.joint_count) - 1, -1, -1):
@@ -74,6 +75,7 @@ def rnea_bias(model: Model, data: Data, out: Array) -> None:
         moment = add(moment, vector(data.bias[i], 0))
         force = add(force, vector(data.bias[i], 3))
         angular, linear = vector(data.motion[i], 0), vector(data.motion[i], 3)
+        # (19); for a prismatic joint the product takes the force
         out[6 + j] = dot(angular, moment) + dot(linear, force)
         if uniform(model.continues[j]) == 0.0:
             accumulate_wrench(data.inwards[whole(model.parent[j])], moment, force)
@@ -103,6 +105,7 @@ def inverse_dynamics_along(
     work = scratch[0]
     for first in range(0, count, WIDTH):
         for lane in range(WIDTH):
+            # lanes beyond the last reference repeat it
             row = min(first + lane, count - 1)
             for i in range(size):
                 numbers[i, lane] = references[row, i]
@@ -137,11 +140,13 @@ def inverse_dynamics(
             angular, linear = load_motion(data.outwards[whole(model.parent[j])])
         coriolis, motion = data.coriolis[j + 1], data.motion[j + 1]
         acceleration = reference.joint_accelerations[j]
+        # (13), (14)
         angular = add(add(angular, vector(coriolis, 0)), scale(vector(motion, 0), acceleration))
         linear = add(add(linear, vector(coriolis, 3)), scale(vector(motion, 3), acceleration))
         _add_force_of_body(model, j + 1, angular, linear, data)
         if uniform(model.branches[j + 1]) != 0.0:
             store_motion(angular, linear, data.outwards[j + 1])
+    # all forces sum to f0 = 0 of (29): the whole drifts with v0dot
     mass, force = model.mass[0], vector(data.bias[0], 3)
     for i in range(1, count + 1):
         mass, force = mass + model.mass[i], add(force, vector(data.bias[i], 3))

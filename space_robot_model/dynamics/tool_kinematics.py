@@ -23,12 +23,10 @@ Joint motions with ``H~_wm thetadot = 0`` need no torque on the base: the reacti
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.typing import NDArray
-
 from space_robot_msgs_py.compiled.kernels import kernel, subroutine
 from space_robot_msgs_py.compiled.records import Record, nested, shaped
 
+from ..elementary.matrices import Array
 from .algebra import (
     Vector,
     add,
@@ -47,8 +45,6 @@ from .algebra import (
 from .crba import crba
 from .kinematics import forward_kinematics
 from .model import Data, Model
-
-Array = NDArray[np.float64]
 
 
 class ToolKinematics(Record):
@@ -121,6 +117,7 @@ def _fixed_base(model: Model, body: int, tool: Vector, out: ToolKinematics) -> N
     out.base[1, 3], out.base[1, 5] = -tool[2], tool[0]
     out.base[2, 3], out.base[2, 4] = tool[1], -tool[0]
     i = body
+    # only joints between the tool and the base move it
     while i > 0:
         angular, linear = vector(out.data.motion[i], 0), vector(out.data.motion[i], 3)
         linear = add(linear, cross(angular, tool))
@@ -141,6 +138,7 @@ def _momentum_coupling(tool: Vector, out: ToolKinematics) -> None:
         moment = cross(com, linear)
         for k in range(3):
             out.coupling[k, j] = full[3 + k, 6 + j] - moment[k]
+    # H~_ww: H_w moved from the base to the centre of mass, parallel axes
     square = dot(com, com)
     out.inertia[0] = full[3, 3] - mass * (square - com[0] * com[0])
     out.inertia[1] = full[4, 4] - mass * (square - com[1] * com[1])
@@ -153,6 +151,7 @@ def _momentum_coupling(tool: Vector, out: ToolKinematics) -> None:
 @subroutine
 def _eliminate_base(out: ToolKinematics) -> None:
     full = out.full_inertia
+    # P = 0 gives v0, L = 0 gives w0; each is put into the twist
     mass, mobility = full[0, 0], inverse_symmetric(symmetric(out.inertia))
     for c in range(3):
         for r in range(3):

@@ -5,14 +5,13 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from space_robot_msgs_py.compiled.kernels import kernel
 from space_robot_msgs_py.compiled.lanes import any_lane, where
 
+from .matrices import Array
 from .rotations import plain_angle_of, plain_sin_cos
-
-Array = NDArray[np.float64]
 
 LN2 = (0.6931471803691238, 1.9082149292705877e-10)
 """log 2 in two parts, the first with 32 bits, so that its product with an exponent is exact."""
@@ -71,6 +70,7 @@ def exp(x: float) -> float:
         return x if np.isnan(x) else math.inf
     if x < SMALLEST:
         return 0.0
+    # e^x = 2^twos e^r with |r| <= log(2) / 2
     twos = np.floor(x / (LN2[0] + LN2[1]) + 0.5)
     high, low = x - twos * LN2[0], twos * LN2[1]
     r = high - low
@@ -98,6 +98,7 @@ def log(x: float) -> float:
     rest = z * (L1 + z * (L2 + z * (L3 + z * (L4 + z * (L5 + z * rest)))))
     half = 0.5 * f * f
     value = twos * LN2[0] - ((half - (s * (half + rest) + twos * LN2[1])) - f)
+    # frexp has no mantissa for infinity and NaN
     value = where(x < math.inf, value, x)
     return where(x > 0.0, value, where(x == 0.0, -math.inf, math.nan))
 
@@ -105,6 +106,7 @@ def log(x: float) -> float:
 @kernel
 def in_steps(value: float, step: float) -> float:
     """Round ``value`` to the nearest whole multiple of ``step``; a step of 0 is none."""
+    # the usual case, without a division
     if not any_lane(step > 0.0):
         return value
     spacing = where(step > 0.0, step, 1.0)

@@ -6,12 +6,11 @@ NumPy hands these to LAPACK, which sums in another order on another processor.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from space_robot_msgs_py.compiled.kernels import kernel, subroutine
 from space_robot_msgs_py.compiled.lanes import all_lanes, where
 
-Array = NDArray[np.float64]
+from .matrices import Array
 
 MOST_SWEEPS = 20
 """Maximum number of sweeps; Jacobi's method needs about six for a (3, 3) matrix."""
@@ -135,6 +134,7 @@ def diagonalise(matrix: Array, vectors: Array) -> None:
 @subroutine
 def _rotate(matrix: Array, vectors: Array, p: int, q: int) -> None:
     off, first, second = matrix[p, q], matrix[p, p], matrix[q, q]
+    # what is rounded away beside both eigenvalues, or would overflow the ratio, counts as zero
     is_small = (abs(off) < 1e-300 * max(abs(first), abs(second))) | (off == 0.0)
     is_small = is_small | ((first + off == first) & (second + off == second))
     if all_lanes(is_small):
@@ -142,6 +142,7 @@ def _rotate(matrix: Array, vectors: Array, p: int, q: int) -> None:
         return
     ratio = (second - first) / where(is_small, 1.0, 2.0 * off)
     side = where(ratio >= 0.0, 1.0, -1.0)
+    # the smaller of the two angles that make the element zero
     tangent = side / (abs(ratio) + np.sqrt(ratio * ratio + 1.0))
     cosine = 1.0 / np.sqrt(tangent * tangent + 1.0)
     sine = tangent * cosine
@@ -212,6 +213,7 @@ def move_to_side(
         for j in range(size):
             work[i, j] = side * (matrix[i, j] - bound[i, j])
     is_definite = is_positive_definite(work)
+    # on that side already: no eigenvalues are needed
     if all_lanes(is_definite):
         return
     for i in range(size):
@@ -259,5 +261,6 @@ def normalise(matrix: Array, root: Array) -> None:
             matrix[i, j] = total * inverse
     for i in range(size):
         for j in range(i):
+            # rounding has made it unsymmetric, and rotations read both halves
             mean = 0.5 * (matrix[i, j] + matrix[j, i])
             matrix[i, j] = matrix[j, i] = mean

@@ -22,6 +22,7 @@ def product(a: ArrayLike, b: ArrayLike) -> Array:
     """Return ``a @ b`` for vectors and matrices; ``a`` may be a stack of them."""
     left, right = np.asarray(a, dtype=np.float64), np.asarray(b, dtype=np.float64)
     result = np.zeros(left.shape[:-1] + right.shape[1:])
+    # term by term: the same order on every processor
     for k in range(len(right)):
         column = left[..., k]
         result += column * right[k] if right.ndim == 1 else column[..., np.newaxis] * right[k]

@@ -10,7 +10,6 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from space_robot_msgs_py.compiled.kernels import kernel, subroutine
 from space_robot_msgs_py.compiled.lanes import (
@@ -24,8 +23,8 @@ from space_robot_msgs_py.compiled.lanes import (
 )
 
 from .functions import log
+from .matrices import Array
 
-Array = NDArray[np.float64]
 Pair = tuple[float, float]
 Words = tuple[np.uint64, np.uint64]
 State = tuple[np.uint64, np.uint64, np.uint64, np.uint64]
@@ -101,6 +100,7 @@ def normal_numbers(draws: Array, seed: float, key: int, block: int) -> None:
         state = pcg64(int(lane_of(seed, lane)), key, block)
         for i in range(lane, flat.size, width):
             state = following(state)
+            # halfway between multiples of 2**-52: never 0 or 1, whose quantiles are infinite
             flat[i] = (np.int64(bits_of(state) >> UNUSED_BITS) + 0.5) * 2.0**-52
     eights = as_lanes(flat.reshape(-1, WIDTH))
     for i in range(eights.size):
@@ -118,6 +118,7 @@ def quantile(share: float) -> float:
     q = share - 0.5
     is_central = abs(q) <= CENTRE
     value = q * _ratio(CENTRAL, CENTRE * CENTRE - q * q)
+    # 85 % of all numbers
     if all_lanes(is_central):
         return value
     small = where(q < 0.0, share, 1.0 - share)

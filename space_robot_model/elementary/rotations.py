@@ -9,13 +9,11 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from space_robot_msgs_py.compiled.lanes import any_lane, where
 
-from .matrices import norm
-
-Array = NDArray[np.float64]
+from .matrices import Array, norm
 
 TURNS = 2.0 / math.pi
 """Quarter turns per radian."""
@@ -102,7 +100,9 @@ def plain_angle_of(y: float, x: float) -> float:
         series = A3 + z * (A5 + z * (A7 + z * (A9 + z * series)))
         angle = OF_QUARTERS[number] + (REST_OF_QUARTERS[number] + (r + r * z * series))
     if abs(y) > abs(x):
+        # pi/2 is not a float: its rounding error is added before the sum is rounded
         angle = 0.5 * math.pi - (angle - REST_OF_HALF_PI)
+    # the sign of a zero counts, as in C
     if math.copysign(1.0, x) < 0.0:
         angle = math.pi - (angle - 2.0 * REST_OF_HALF_PI)
     return math.copysign(angle, y)

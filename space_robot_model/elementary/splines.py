@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from space_robot_msgs_py.compiled.kernels import kernel
 
-Array = NDArray[np.float64]
+from .matrices import Array
 
 
 def _locate(knots: Array, time: Array) -> tuple[NDArray[np.intp], Array, Array, NDArray[np.bool_]]:

@@ -26,7 +26,7 @@ MOST_DIFFERENCED = 256
 """Maximum number of ticks over which an encoder's rate is differenced."""
 
 
-def has_direction(vector: list[float]) -> list[float]:
+def check_direction(vector: list[float]) -> list[float]:
     """Return ``vector`` if it can be scaled to norm 1.
 
     Raises:
@@ -46,7 +46,7 @@ class StarTrackerSettings(StrictModel):
         0.0, description="noise about the boresight, standard deviation, rad"
     )
     boresight: Annotated[
-        list[float], Field(min_length=3, max_length=3), AfterValidator(has_direction)
+        list[float], Field(min_length=3, max_length=3), AfterValidator(check_direction)
     ] = Field([0.0, 0.0, 1.0], description="boresight in the base frame")
     rate: Annotated[float, Field(ge=0.0, le=1e5)] = Field(
         0.0,
@@ -73,6 +73,7 @@ class StarTrackerSettings(StrictModel):
                 f"star_tracker.rate must be at most one measurement a tick, "
                 f"{1.0 / period:g} Hz, got {self.rate:g}"
             )
+        # exposures fall on ticks: the plant knows its state nowhere else
         interval = max(1, round(1.0 / (self.rate * period))) if self.rate else 1
         delay = round(self.delay / period)
         if delay // interval >= MOST_UNDER_WAY:

@@ -5,16 +5,13 @@ from __future__ import annotations
 from typing import Annotated, ClassVar, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import BaseModel, Field
 
 from space_robot_msgs_py.config.files import named_file, node_parameters
 from space_robot_msgs_py.config.validation import StrictModel, validate
 from space_robot_msgs_py.errors import InputError
 
-from ..elementary.matrices import direction_norm, unit_rows
-
-Array = NDArray[np.float64]
+from ..elementary.matrices import Array, direction_norm, unit_rows
 
 Sheet = TypeVar("Sheet", bound=BaseModel)
 
@@ -60,11 +57,7 @@ class MountedSheet(StrictModel):
         return len(vectors(getattr(self, next(iter(type(self).model_fields)))))
 
     def values(self, name: str) -> Array:
-        """Return the values (count,) of the setting ``name``, one per actuator.
-
-        Raises:
-            InputError: neither one value, nor one per actuator.
-        """
+        """Return the values (count,) of the setting ``name``, one per actuator."""
         if not self.count:
             return np.empty(0)
         what = self.section[:-1].replace("_", " ")
@@ -78,11 +71,7 @@ class MountedSheet(StrictModel):
 
 
 def per_axis(sheet: object, name: str, n: int) -> Array:
-    """Return the values (n+3,) of a setting: of base x, y, z, then of ``n`` joints.
-
-    Raises:
-        InputError: neither one value, nor one per axis.
-    """
+    """Return the values (n+3,) of a setting: of base x, y, z, then of ``n`` joints."""
     allowed = f"{n + 3} are allowed: base x, y, z and {n} joints"
     return _spread(getattr(sheet, name), name, n + 3, allowed)
 
@@ -94,7 +83,7 @@ def _spread(numbers: list[float], key: str, count: int, allowed: str) -> Array:
     return values
 
 
-def are_vectors(flat: list[float], most: int) -> list[float]:
+def check_vectors(flat: list[float], most: int) -> list[float]:
     """Return ``flat`` if it has x, y, z of at most ``most`` vectors, or none (``[0.0]``).
 
     Raises:
@@ -108,13 +97,9 @@ def are_vectors(flat: list[float], most: int) -> list[float]:
     return flat
 
 
-def are_directions(flat: list[float], most: int) -> list[float]:
-    """Return ``flat`` if all its vectors can be scaled to norm 1, see `are_vectors`.
-
-    Raises:
-        ValueError: a vector is too short or too long.
-    """
-    for i, vector in enumerate(vectors(are_vectors(flat, most)), 1):
+def check_directions(flat: list[float], most: int) -> list[float]:
+    """Return ``flat`` if all its vectors can be scaled to norm 1, see `check_vectors`."""
+    for i, vector in enumerate(vectors(check_vectors(flat, most)), 1):
         direction_norm(vector, f"vector {i}")
     return flat
 

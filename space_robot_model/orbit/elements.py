@@ -6,16 +6,13 @@ import math
 from typing import Annotated
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field, model_validator
 from typing_extensions import Self
 
 from space_robot_msgs_py.config.validation import StrictModel
 
-from ..elementary.matrices import norm
+from ..elementary.matrices import Array, norm
 from ..elementary.rotations import plain_sin_cos
-
-Array = NDArray[np.float64]
 
 MU = 3.986004418e14
 """Gravitational parameter of the Earth, m3/s2."""
@@ -51,7 +48,7 @@ class ElementSettings(StrictModel):
         return EARTH_RADIUS + self.height
 
     @model_validator(mode="after")
-    def _stays_outside(self) -> Self:
+    def _check_perigee(self) -> Self:
         perigee = self.semi_major_axis * (1.0 - self.eccentricity) - EARTH_RADIUS
         if self.height and perigee <= 0.0:
             most = self.height / self.semi_major_axis
@@ -63,7 +60,7 @@ class ElementSettings(StrictModel):
         return self
 
 
-def plane_of(elements: ElementSettings) -> tuple[Array, Array, Array]:
+def orbit_plane(elements: ElementSettings) -> tuple[Array, Array, Array]:
     """Return the unit vectors to the ascending node, 90 degrees ahead of it, and of the normal."""
     s, c = plain_sin_cos(elements.raan_deg * TO_RAD)
     si, ci = plain_sin_cos(elements.inclination_deg * TO_RAD)
@@ -74,6 +71,7 @@ def state_of(elements: ElementSettings) -> tuple[Array, Array]:
     """Return position, m, and velocity, m/s, by Kepler's equation."""
     e, a = elements.eccentricity, elements.semi_major_axis
     mean = math.remainder(elements.anomaly_deg * TO_RAD, 2.0 * math.pi)
+    # Newton's method from pi converges for any eccentricity
     anomaly = mean if e < 0.8 else math.copysign(math.pi, mean)
     for _ in range(50):
         s, c = plain_sin_cos(anomaly)
@@ -84,7 +82,7 @@ def state_of(elements: ElementSettings) -> tuple[Array, Array]:
     along, across = a * (c - e), a * root * s
     v_along, v_across = -rate * s, rate * root * c
     sp, cp = plain_sin_cos(elements.perigee_deg * TO_RAD)
-    node, ahead, _ = plane_of(elements)
+    node, ahead, _ = orbit_plane(elements)
     p, q = cp * node + sp * ahead, cp * ahead - sp * node
     return along * p + across * q, v_along * p + v_across * q
 
@@ -109,7 +107,7 @@ def sun_of(elements: ElementSettings, beta_angle_deg: float, noon_deg: float) ->
         beta_angle_deg: angle of the Sun above the plane of the orbit at tick 0, degrees.
         noon_deg: angle in the orbit, from the ascending node, at which it is noon, degrees.
     """
-    node, ahead, normal = plane_of(elements)
+    node, ahead, normal = orbit_plane(elements)
     s, c = plain_sin_cos(noon_deg * TO_RAD)
     sb, cb = plain_sin_cos(beta_angle_deg * TO_RAD)
     direction: Array = cb * (c * node + s * ahead) + sb * normal

@@ -9,15 +9,12 @@ from __future__ import annotations
 from typing import Annotated, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 
 from space_robot_msgs_py.config.validation import StrictModel
 
-from ..elementary.matrices import product
+from ..elementary.matrices import Array, product
 from .elements import Degrees, ElementSettings, hill_axes, state_of, sun_of
-
-Array = NDArray[np.float64]
 
 Distance = Annotated[float, Field(ge=-1e6, le=1e6)]
 Speed = Annotated[float, Field(ge=-1e3, le=1e3)]
@@ -125,6 +122,7 @@ class Ephemeris:
         from .propagation import STEP, propagate  # slow to import
 
         if latest >= (known := len(self._nodes) - 1) * STEP or not known:
+            # half as many again: asked tick by tick it seldom propagates
             extended = np.empty((int(max(latest, 0.0) / STEP) + 2 + known // 2, 18))
             extended[: known + 1] = self._nodes
             propagate(extended, known + 1, self.has_j2)

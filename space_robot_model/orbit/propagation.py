@@ -11,15 +11,14 @@ a quintic through position, velocity and acceleration.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from space_robot_msgs_py.compiled.kernels import kernel, subroutine
 from space_robot_msgs_py.compiled.lanes import uniform
 
 from ..dynamics.algebra import Vector, add, dot, scale, store, subtract, vector
+from ..elementary.matrices import Array
 from .elements import MU, OBLATENESS
 
-Array = NDArray[np.float64]
 Motion = tuple[Vector, Vector, Vector, Vector]
 """Position, m, velocity, acceleration and jerk."""
 
@@ -47,6 +46,7 @@ def gravity_at(r: Vector, has_j2: float) -> Vector:
     fall = scale(r, -MU / (square * distance))
     if uniform(has_j2) != 0.0:
         factor = -OBLATENESS / (square * square * distance)
+        # J2: 3/2 J2 mu R^2 / r^5 times (x (5 z^2/r^2 - 1), the same y, z (5 z^2/r^2 - 3))
         height = 5.0 * r[2] * r[2] / square
         pull = (r[0] * (1.0 - height), r[1] * (1.0 - height), r[2] * (3.0 - height))
         fall = add(fall, scale(pull, factor))
@@ -83,6 +83,7 @@ def propagate(nodes: Array, first: int, has_j2: float) -> None:
         r, v = vector(node, 0), vector(node, 3)
         d, w = vector(node, TARGET), vector(node, TARGET + 3)
         pull = gravity_at(r, has_j2)
+        # relative to the point: the difference of two positions would lose seven digits
         tide = subtract(gravity_at(add(r, d), has_j2), pull)
         store(pull, node, 6)
         store(tide, node, TARGET + 6)
@@ -94,6 +95,7 @@ def propagate(nodes: Array, first: int, has_j2: float) -> None:
             x, u, a = zero, zero, pull
             y, s, b = zero, zero, tide
             for _ in range(count):
+                # kick, drift, kick
                 u, s = add(u, scale(a, 0.5 * step)), add(s, scale(b, 0.5 * step))
                 x, y = add(x, scale(add(v, u), step)), add(y, scale(add(w, s), step))
                 position = add(r, x)

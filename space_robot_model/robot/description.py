@@ -3,19 +3,16 @@
 from __future__ import annotations
 
 import math
-from pathlib import Path
+import os.path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..elementary.matrices import norms
-from .files import gear_document
+from .files import gear_document, plain_numbers
 from .parts import MANY_TURNS
 from .robot import Robot
 from .shapes import plates_of
-
-Array = NDArray[np.float64]
 
 FAR = 100.0
 """Distance between two joints that asks for a remark, m."""
@@ -34,7 +31,11 @@ def describe(robot: Robot) -> dict[str, Any]:
         "bodies": [_body(robot, number) for number in range(robot.joint_count + 1)],
         "joints": [_joint(robot, number) for number in range(robot.joint_count)],
         "tools": [
-            {"name": t.name, "body": robot.body_names[t.body], "position": _numbers(t.position)}
+            {
+                "name": t.name,
+                "body": robot.body_names[t.body],
+                "position": plain_numbers(t.position),
+            }
             for t in robot.tools
         ],
         "shapes": [
@@ -42,7 +43,7 @@ def describe(robot: Robot) -> dict[str, Any]:
                 "body": robot.body_names[seen.body],
                 "shape": seen.shape,
                 "size": list(seen.size),
-                **({"mesh": seen.mesh, "found": _is_file(seen.mesh)} if seen.mesh else {}),
+                **({"mesh": seen.mesh, "found": os.path.isfile(seen.mesh)} if seen.mesh else {}),
             }
             for seen in robot.visuals
         ],
@@ -75,9 +76,9 @@ def _body(robot: Robot, number: int) -> dict[str, Any]:
         "name": robot.body_names[number],
         "joint": robot.all_joint_names[number - 1] if number else None,
         "mass": float(robot.mass[number]),
-        "com": _numbers(robot.com[number]),
-        "inertia": [_numbers(row) for row in robot.inertia[number]],
-        "principal_moments": _numbers(np.linalg.eigvalsh(robot.inertia[number])),
+        "com": plain_numbers(robot.com[number]),
+        "inertia": [plain_numbers(row) for row in robot.inertia[number]],
+        "principal_moments": plain_numbers(np.linalg.eigvalsh(robot.inertia[number])),
     }
 
 
@@ -115,14 +116,3 @@ def _plates(robot: Robot) -> dict[str, Any]:
             if name in areas
         ],
     }
-
-
-def _numbers(values: Array) -> list[float]:
-    return [float(value) + 0.0 for value in values]  # without negative zeros
-
-
-def _is_file(name: str) -> bool:
-    try:
-        return Path(name).is_file()
-    except (OSError, ValueError):
-        return False

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from space_robot_msgs_py.compiled.lanes import WIDTH
 
@@ -15,6 +15,7 @@ from ..dynamics.kinematics import forward_kinematics, spatial_velocities
 from ..dynamics.model import Data
 from ..dynamics.rho_space import RhoSpaceModel, free_inverse_dynamics_along
 from ..dynamics.rnea import AlongScratch, inverse_dynamics_along, rnea_bias
+from ..elementary.matrices import Array
 from .kinematics import check_robot, unit_quaternion, vector
 
 if TYPE_CHECKING:
@@ -22,12 +23,18 @@ if TYPE_CHECKING:
 
     from .robot import Robot
 
-Array = NDArray[np.float64]
-
 
 def generalised_rows(robot: Robot) -> list[int]:
     """Return the index in the algorithms of each of ``[v0, w0, joints]``, see `Model.row`."""
     return [*range(6), *(6 + row for row in robot.model_rows)]
+
+
+def _data_at(robot: Robot, quaternion_wxyz: ArrayLike, joint_positions: ArrayLike) -> Data:
+    check_robot(robot)
+    data = Data.allocate(robot.joint_count)
+    positions = vector(joint_positions, robot.joint_count, "joint_positions")[list(robot.order)]
+    forward_kinematics(robot.model, unit_quaternion(quaternion_wxyz), positions, data)
+    return data
 
 
 def mass_matrix(robot: Robot, quaternion_wxyz: ArrayLike, joint_positions: ArrayLike) -> Array:
@@ -45,11 +52,9 @@ def mass_matrix(robot: Robot, quaternion_wxyz: ArrayLike, joint_positions: Array
     Raises:
         InputError: an argument has a wrong type or shape, or the quaternion is not unit.
     """
-    check_robot(robot)
-    n, order, rows = robot.joint_count, list(robot.order), generalised_rows(robot)
-    out, data = np.empty((n + 6, n + 6)), Data.allocate(n)
-    positions = vector(joint_positions, n, "joint_positions")[order]
-    forward_kinematics(robot.model, unit_quaternion(quaternion_wxyz), positions, data)
+    data = _data_at(robot, quaternion_wxyz, joint_positions)
+    rows = generalised_rows(robot)
+    out = np.empty((len(rows), len(rows)))
     crba(robot.model, data, out)
     return out[np.ix_(rows, rows)]
 
@@ -63,12 +68,7 @@ def bias_force(
 ) -> Array:
     """Return the velocity-dependent force c of (20): ``H qdd + c = F``.
 
-    Args:
-        robot: with N joints.
-        quaternion_wxyz: (4,) base attitude, unit.
-        joint_positions: (N,) of all joints, rad, or m for prismatic ones.
-        w0_inertial: (3,) base angular velocity in inertial axes, rad/s.
-        joint_velocities: (N,) of all joints, rad/s or m/s.
+    Args: see `forward_dynamics`.
 
     Returns:
         (N+6,) force (N), moment about the base CoM (N m) on inertial axes, joint torques (N m).
@@ -76,13 +76,11 @@ def bias_force(
     Raises:
         InputError: an argument has a wrong type or shape, or the quaternion is not unit.
     """
-    check_robot(robot)
-    n, order, rows = robot.joint_count, list(robot.order), generalised_rows(robot)
-    out, data = np.empty(n + 6), Data.allocate(n)
-    positions = vector(joint_positions, n, "joint_positions")[order]
-    velocities = vector(joint_velocities, n, "joint_velocities")[order]
-    forward_kinematics(robot.model, unit_quaternion(quaternion_wxyz), positions, data)
+    data = _data_at(robot, quaternion_wxyz, joint_positions)
+    n, rows = robot.joint_count, generalised_rows(robot)
+    velocities = vector(joint_velocities, n, "joint_velocities")[list(robot.order)]
     spatial_velocities(robot.model, vector(w0_inertial, 3, "w0_inertial"), velocities, data)
+    out = np.empty(n + 6)
     rnea_bias(robot.model, data, out)
     return out[rows]
 
@@ -112,17 +110,15 @@ def forward_dynamics(
     Raises:
         InputError: an argument has a wrong type or shape, or the quaternion is not unit.
     """
-    check_robot(robot)
-    n, order, rows = robot.joint_count, list(robot.order), generalised_rows(robot)
-    out, data = np.empty(n + 6), Data.allocate(n)
-    positions = vector(joint_positions, n, "joint_positions")[order]
+    data = _data_at(robot, quaternion_wxyz, joint_positions)
+    n, order = robot.joint_count, list(robot.order)
     velocities = vector(joint_velocities, n, "joint_velocities")[order]
     omega = vector(w0_inertial, 3, "w0_inertial")
     forces = vector(force, n + 6, "force")[[*range(6), *(6 + joint for joint in order)]]
-    forward_kinematics(robot.model, unit_quaternion(quaternion_wxyz), positions, data)
     spatial_velocities(robot.model, omega, velocities, data)
+    out = np.empty(n + 6)
     aba(robot.model, omega, velocities, forces, data, out)
-    return out[rows]
+    return out[generalised_rows(robot)]
 
 
 def inverse_dynamics(robot: Robot, references: Block) -> Array:

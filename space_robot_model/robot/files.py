@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field, model_validator
 from typing_extensions import Self
 
@@ -16,15 +15,25 @@ from space_robot_msgs_py.config.text import choices
 from space_robot_msgs_py.config.validation import StrictModel, one_of, short, validate
 from space_robot_msgs_py.errors import InputError
 
-from ..elementary.matrices import product
+from ..elementary.matrices import Array, product
 from ..elementary.rotations import rpy_of_rotation
 from .inertia import inertia_elements
 from .names import BASE
-from .parts import Body, Drive, Gear, Name, Plate, Plates, RobotPart, RobotTree, Spring, Visual
-from .urdf import UrdfRobot, parse_urdf, read_urdf
+from .parts import (
+    Body,
+    Drive,
+    Gear,
+    Name,
+    Plate,
+    Plates,
+    RobotPart,
+    RobotTree,
+    Spring,
+    Visual,
+    moved,
+)
+from .urdf import UrdfRobot, read_urdf
 from .urdf_xml import IDENTITY
-
-Array = NDArray[np.float64]
 
 
 class RobotDocument(StrictModel):
@@ -57,7 +66,7 @@ class UrdfReference(RobotPart):
     """Links whose frames are tools, in order of rank; default: the ends of the branches."""
 
     @model_validator(mode="after")
-    def _one_source(self) -> Self:
+    def _check_source(self) -> Self:
         if bool(self.urdf) == bool(self.urdf_text):
             raise ValueError("either urdf or urdf_text is needed, and not both")
         return self
@@ -68,7 +77,7 @@ class UrdfReference(RobotPart):
             urdf = read_urdf(folder / self.urdf, self.base, self.repair, self.tools)
         else:
             path = folder / f"{self.name or 'robot'}.urdf"
-            urdf = parse_urdf(self.urdf_text, path, self.base, self.repair, self.tools)
+            urdf = read_urdf(path, self.base, self.repair, self.tools, self.urdf_text)
         tree = urdf.tree
         joints = {link.joint_label: link for link in tree.links}
         moving = [name for name, link in joints.items() if link.moves]
@@ -89,7 +98,6 @@ class UrdfReference(RobotPart):
         )
 
     def _with_drive(self, link: Body) -> Body:
-        """Return a link with its spring or drive."""
         name = link.joint_label
         if not (spring := self.passive.get(name)):
             return replace(link, drive=self.drives.get(name))
@@ -98,7 +106,6 @@ class UrdfReference(RobotPart):
         return replace(link, passive=spring, friction=friction)
 
     def _placed(self, urdf: UrdfRobot, where: str) -> Plates:
-        """Return the plates in the axes of the bodies."""
         names = [urdf.tree.base.name, *(link.name for link in urdf.tree.links)]
         placed = []
         for number, plate in enumerate(self.plates):
@@ -106,10 +113,8 @@ class UrdfReference(RobotPart):
             if name not in names:
                 key, advice = f"robot.plates.{number}.link", choices(name, names)
                 raise InputError(f"{where}: {key}: no link {short(name)}: {advice}")
-            frame, own = urdf.frames.get(name, IDENTITY), plate.normalised
-            normal = product(frame.rotation.T, own.normal)
-            centre = product(frame.rotation.T, own.centre - frame.position)
-            placed.append(replace(own, link=name, normal=normal, centre=centre))
+            frame = urdf.frames.get(name, IDENTITY)
+            placed.append(moved(plate.normalised, frame.rotation.T, frame.inside, link=name))
         return placed
 
 
@@ -130,9 +135,6 @@ def read_content(content: dict[str, Any], folder: Path, where: str) -> RobotTree
         content: of the YAML.
         folder: of the YAML.
         where: name of the YAML, for errors.
-
-    Raises:
-        InputError: the YAML or the URDF is invalid.
     """
     if is_urdf(content):
         return validate(_UrdfDocument, content, where).robot.read(folder, where)
@@ -157,7 +159,7 @@ def _plain(value: Any, name: str = "") -> Any:
     return value
 
 
-def document_of(tree: RobotTree) -> dict[str, Any]:
+def readable_document(tree: RobotTree) -> dict[str, Any]:
     """Return the mapping from which `Robot.from_dict` builds the same robot, of a flattened tree.
 
     Frames are written in degrees, so numbers may differ from the robot's in their last digits. The
@@ -167,7 +169,10 @@ def document_of(tree: RobotTree) -> dict[str, Any]:
     links = sorted(tree.links, key=lambda link: link.passive is not None)
     robot: dict[str, Any] = {
         "name": tree.name,
-        "base": {"mass": tree.base.mass, "inertia": _numbers(inertia_elements(tree.base.inertia))},
+        "base": {
+            "mass": tree.base.mass,
+            "inertia": plain_numbers(inertia_elements(tree.base.inertia)),
+        },
         "links": [_link(link, carriers[link.parent]) for link in links],
         "tools": [
             {
@@ -196,8 +201,8 @@ def _link(link: Body, parent: str) -> dict[str, Any]:
         "joint": link.joint,
         "origin": _origin(link.rotation, product(link.rotation, link.offset)),
         "mass": link.mass,
-        "inertia": _numbers(inertia_elements(link.inertia)),
-        "com": _numbers(link.com),
+        "inertia": plain_numbers(inertia_elements(link.inertia)),
+        "com": plain_numbers(link.com),
     }
     if link.friction:
         entry["friction"] = link.friction._asdict()
@@ -226,18 +231,21 @@ def gear_document(gear: Gear) -> dict[str, Any]:
 
 
 def _on_link(part: Plate | Visual, link: str) -> dict[str, Any]:
-    """Return a plate or visual as in a file."""
     entry: dict[str, Any] = {"link": link} | _plain(replace(part, link=""))
     if isinstance(part, Plate):
-        return entry | {"normal": _numbers(part.normal), "centre": _numbers(part.centre)}
+        return entry | {"normal": plain_numbers(part.normal), "centre": plain_numbers(part.centre)}
     del entry["rotation"], entry["position"]
     return entry | {"origin": _origin(part.rotation, part.position)}
 
 
 def _origin(rotation: Array, position: Array) -> dict[str, Any]:
-    return {"xyz": _numbers(position), "rpy_deg": _numbers(np.degrees(rpy_of_rotation(rotation)))}
+    return {
+        "xyz": plain_numbers(position),
+        "rpy_deg": plain_numbers(np.degrees(rpy_of_rotation(rotation))),
+    }
 
 
-def _numbers(values: Array) -> list[float]:
-    """Return floats without negative zeros."""
+def plain_numbers(values: Array) -> list[float]:
+    """Return floats for a file."""
+    # adding 0 makes negative zeros positive, which a reader would take for a sign
     return [float(value) + 0.0 for value in values]

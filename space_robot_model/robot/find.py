@@ -34,7 +34,7 @@ from space_robot_msgs_py.config.validation import read_yaml, short
 from space_robot_msgs_py.config.yaml_text import check_readable, is_folder, parse_yaml, read_file
 from space_robot_msgs_py.errors import InputError, explained_by
 
-from .files import document_of, is_urdf
+from .files import is_urdf, readable_document
 from .robot import Robot
 
 YAML, URDF = (".yaml", ".yml"), (".urdf", ".xacro")
@@ -105,9 +105,9 @@ def robot_files(robot: str) -> RobotFiles:
     path = Path(robot)
     if robot.endswith((*YAML, *URDF)):
         check_readable(path)
-        return _own_folder(path) if path.stem == ROBOT_STEM else _in_config(path)
+        return _in_own_folder(path) if path.stem == ROBOT_STEM else _in_config(path)
     if "/" in robot:
-        return _own_folder(_file_of(path))
+        return _in_own_folder(_file_of(path))
     if not is_named(ROBOTS, robot):
         raise InputError(
             f"unknown robot {short(robot)}: "
@@ -118,7 +118,6 @@ def robot_files(robot: str) -> RobotFiles:
 
 
 def _file_here(path: Path) -> str:
-    """Return a suggestion of a robot's file with the same stem; empty if there is none."""
     stem = path.parent / path.stem
     files = (Path(f"{stem}{suffix}") for suffix in (*URDF, *YAML))
     same = next((str(file) for file in files if os.path.isfile(file)), "")
@@ -132,9 +131,6 @@ def find_robot(robot: str, base: str | None = None, repair: bool = False) -> Rob
         robot: name or path, see above.
         base: the link that is the satellite, of a URDF (None: as in the name, else its root).
         repair: True to repair a URDF's defects, also if the name does not request it.
-
-    Raises:
-        InputError: there is no such robot, or its file is invalid.
     """
     return robot_source(path_text(robot, "robot"), base, repair).robot
 
@@ -145,17 +141,24 @@ def robot_source(robot: str, base: str | None = None, repair: bool = False) -> R
     return read_robot_file(robot_files(robot).file, base or chosen.base, repair or chosen.repair)
 
 
-def mission_file(robot: str, mission: str = "") -> Path:
-    """Return the file of a mission; that of the robot's own mission if the name is empty.
+@explained_by("own-trajectory")
+def mission_layers(robot: str, mission: str) -> list[Path]:
+    """Return the file of a mission in a list; an empty list for `GIVEN`.
+
+    Args:
+        robot: name or path.
+        mission: name or path; empty: the robot's own mission.
 
     Raises:
         InputError: there is no such mission or robot; with advice.
     """
+    if mission == GIVEN:
+        return []
     if mission.endswith(TRAJECTORIES):
         check_readable(Path(mission))
-        return Path(mission)
+        return [Path(mission)]
     if mission:
-        return named_file("missions", mission)
+        return [named_file("missions", mission)]
     files = robot_files(robot)
     if robot == GIVEN:
         raise InputError("a robot without file has no mission of its own: choose one")
@@ -165,17 +168,7 @@ def mission_file(robot: str, mission: str = "") -> Path:
             f"robot {short(robot)} has no mission of its own: `{new_command(robot)}` "
             "makes one, with gains; or choose a mission"
         )
-    return files.mission
-
-
-@explained_by("own-trajectory")
-def mission_layers(robot: str, mission: str) -> list[Path]:
-    """Return the `mission_file` in a list; an empty list for `GIVEN`.
-
-    Raises:
-        InputError: there is no such mission or robot.
-    """
-    return [] if mission == GIVEN else [mission_file(robot, mission)]
+    return [files.mission]
 
 
 def new_command(robot: str) -> str:
@@ -219,25 +212,20 @@ def robot_as_path(robot: str) -> str:
 
 def _in_config(file: Path) -> RobotFiles:
     config, name = config_directory(), file.stem
-    mission, gains = config / "missions" / f"{name}.yaml", config / "gains" / name
-    return RobotFiles(
-        name, file, mission if mission.is_file() else None, gains if is_folder(gains) else None
-    )
+    return _robot_files(name, file, config / "missions" / f"{name}.yaml", config / "gains" / name)
 
 
-def _own_folder(file: Path) -> RobotFiles:
+def _in_own_folder(file: Path) -> RobotFiles:
     folder = file.parent
-    mission, gains = folder / OWN_MISSION, folder / OWN_GAINS
-    return RobotFiles(
-        folder.resolve().name,
-        file,
-        mission if mission.is_file() else None,
-        gains if is_folder(gains) else None,
-    )
+    return _robot_files(folder.resolve().name, file, folder / OWN_MISSION, folder / OWN_GAINS)
+
+
+def _robot_files(name: str, file: Path, mission: Path, gains: Path) -> RobotFiles:
+    has_mission, has_gains = mission.is_file(), is_folder(gains)
+    return RobotFiles(name, file, mission if has_mission else None, gains if has_gains else None)
 
 
 def _file_of(folder: Path) -> Path:
-    """Return the robot's file in its own folder."""
     endings = (*YAML, *URDF)
     if os.path.lexists(folder) and not is_folder(folder):
         raise InputError(
@@ -284,29 +272,25 @@ def read_robot_file(file: Path, base: str | None = None, repair: bool = False) -
         InputError: the file is invalid, or ``base`` or ``repair`` is set for a YAML.
     """
     if file.suffix in URDF:
-        return _of_urdf(file, base, repair)
+        head = f"From {file.name}{f', base {base}' if base else ''}."
+        return _robot_source(Robot.from_urdf(file, base, repair), file, head)
     if base or repair:
         raise InputError(f"{file}: not a URDF, so base and repair cannot be chosen")
     content = read_yaml(file)
     if not is_urdf(content):
-        return _of_yaml(str(file), read_file(file))
-    robot = Robot.from_yaml(file)
-    return _of_robot(robot, file, f"From {file.name} and the URDF that it refers to.")
+        return _yaml_source(str(file), read_file(file))
+    head = f"From {file.name} and the URDF that it refers to."
+    return _robot_source(Robot.from_yaml(file), file, head)
 
 
 @lru_cache(maxsize=16)
-def _of_yaml(where: str, text: str) -> RobotSource:
-    """Return the source of a YAML text; cached, since many flights use the same robot."""
+def _yaml_source(where: str, text: str) -> RobotSource:
+    # cached, since a campaign flies the same robot thousands of times
     return RobotSource(where, parse_yaml(text), text)
 
 
-def _of_urdf(file: Path, base: str | None, repair: bool) -> RobotSource:
-    robot = Robot.from_urdf(file, base, repair)
-    return _of_robot(robot, file, f"From {file.name}{f', base {base}' if base else ''}.")
-
-
-def _of_robot(robot: Robot, file: Path, head: str) -> RobotSource:
-    content = document_of(robot.tree)
+def _robot_source(robot: Robot, file: Path, head: str) -> RobotSource:
+    content = readable_document(robot.tree)
     comments = [head, *(f"Repaired: {text}" for text in robot.repairs)]
     text = "".join(f"# {line}\n" for line in comments) + yaml.safe_dump(
         content, sort_keys=False, default_flow_style=None, width=10_000, allow_unicode=True

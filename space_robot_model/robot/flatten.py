@@ -6,12 +6,11 @@ frame, and the base's frame is at its centre of mass.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from space_robot_msgs_py.config.text import choices
 from space_robot_msgs_py.config.validation import short
@@ -19,12 +18,10 @@ from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.samples import MOST_PASSIVE
 
 from ..dynamics.model import MOST_JOINTS
-from ..elementary.matrices import norm, product, rotate_tensor
+from ..elementary.matrices import Array, norm, product, rotate_tensor
 from .names import first_repeated, other_meaning
-from .parts import Base, Body, JointFriction, Plate, RobotTree, Tool, Visual
+from .parts import Base, Body, JointFriction, Part, Plate, RobotTree, Tool, Visual, moved
 
-Array = NDArray[np.float64]
-Part = TypeVar("Part", Tool, Visual, Plate)
 SETTINGS_FRICTION = JointFriction(np.nan, np.nan)
 
 
@@ -62,7 +59,7 @@ class Place:
         return at if self.shift is None else self.shift + at
 
 
-def arrays_of(tree: RobotTree, where: str = "robot") -> dict[str, Any]:
+def robot_arrays(tree: RobotTree, where: str = "robot") -> dict[str, Any]:
     """Return the fields of a `Robot`.
 
     Joints come branch by branch in the order of ``tree.links``, parents before children, the
@@ -79,10 +76,12 @@ def arrays_of(tree: RobotTree, where: str = "robot") -> dict[str, Any]:
     walked, places = _walk(tree, where)
     for body in walked:
         _merge(body, where)
+    # numbers of a program may have the base's centre of mass elsewhere, see `Robot.nominal`
     if not tree.exact:
         places = _put_base_at_com(walked, places)
-    moved = sorted(walked[1:], key=lambda body: _joint(body).passive is not None)
-    joints = [_joint(body) for body in moved]
+    # a stable sort: actuated joints first, each group branch by branch
+    outer = sorted(walked[1:], key=lambda body: _joint(body).passive is not None)
+    joints = [_joint(body) for body in outer]
     actuated = [joint for joint in joints if not joint.passive]
     springs = tuple(joint.passive for joint in joints if joint.passive)
     for number, most, what in (
@@ -93,16 +92,19 @@ def arrays_of(tree: RobotTree, where: str = "robot") -> dict[str, Any]:
             raise InputError(f"{where}: at most {most} {what} can be flown, got {number}")
     if not actuated:
         raise InputError(f"{where}: a robot needs at least one actuated joint")
-    bodies = [walked[0], *moved]
+    bodies = [walked[0], *outer]
     number_of = {id(body): number for number, body in enumerate(bodies)}
     numbers = [number_of[id(body)] for body in walked]
     gears = [joint.drive for joint in actuated]
 
-    def on_body(parts: Sequence[Part]) -> list[tuple[Part, Place, int]]:
-        return [(part, places[part.link], numbers[places[part.link].body]) for part in parts]
+    def on_body(part: Part) -> Part:
+        place = places[part.link]
+        number = numbers[place.body]
+        return moved(part, place.rotation, place.at, body=number, link=bodies[number].name)
 
-    def by_body(entry: tuple[Any, Place, int]) -> tuple[int, int]:
-        return entry[2], entry[1].rank
+    def by_body(part: Visual | Plate) -> tuple[int, int]:
+        place = places[part.link]
+        return numbers[place.body], place.rank
 
     return {
         "name": tree.name,
@@ -112,51 +114,24 @@ def arrays_of(tree: RobotTree, where: str = "robot") -> dict[str, Any]:
         "mass": np.array([body.mass for body in bodies]),
         "inertia": np.array([body.inertia for body in bodies]),
         "com": np.array([body.com for body in bodies]),
-        "parent": np.array([numbers[body.parent] for body in moved]),
+        "parent": np.array([numbers[body.parent] for body in outer]),
         "rotation": np.array([joint.rotation for joint in joints]),
         "offset": np.array([joint.offset for joint in joints]),
         "is_prismatic": np.array([joint.joint == "prismatic" for joint in joints]),
         "limits": tuple(joint.limits for joint in actuated),
         "friction": tuple(joint.friction or SETTINGS_FRICTION for joint in joints),
         "springs": springs,
-        "tools": tuple(
-            replace(
-                tool,
-                rotation=product(place.rotation, tool.rotation),
-                position=place.at(tool.position),
-                body=number,
-                link=bodies[number].name,
-            )
-            for tool, place, number in on_body(tree.tools)
-        )
-        or (Tool(body=len(joints), link=bodies[-1].name),),
-        "visuals": tuple(
-            replace(
-                visual,
-                rotation=product(place.rotation, visual.rotation),
-                position=place.at(visual.position),
-                body=number,
-                link=bodies[number].name,
-            )
-            for visual, place, number in sorted(on_body(tree.visuals), key=by_body)
-        ),
+        "tools": tuple(map(on_body, tree.tools)) or (Tool(body=len(joints), link=bodies[-1].name),),
+        "visuals": tuple(map(on_body, sorted(tree.visuals, key=by_body))),
         "order": tuple(number - 1 for number in numbers[1:]),
         "gears": tuple(gears) if any(gears) else (),
-        "plates": tuple(
-            replace(
-                plate,
-                normal=product(place.rotation, plate.normal),
-                centre=place.at(plate.centre),
-                body=number,
-                link=bodies[number].name,
-            )
-            for plate, place, number in sorted(on_body(tree.plates), key=by_body)
-        ),
+        "plates": tuple(map(on_body, sorted(tree.plates, key=by_body))),
     }
 
 
 def axes_with_z(axis: Array) -> Array:
     """Return a rotation with the unit vector ``axis`` as third column; exact for z, -x, ..."""
+    # the axis of the frame that is farthest from it, so that nothing small is divided by
     helper = np.zeros(3)
     helper[np.argmin(np.abs(axis))] = 1.0
     x = helper - product(helper, axis) * axis
@@ -218,6 +193,7 @@ def _outwards(tree: RobotTree, where: str) -> Iterator[Body]:
                 "one by its number"
             )
     children: dict[str, list[Body]] = {name: [] for name in names}
+    # children are taken from the end of their list: reversed, so that the first comes first
     for link in reversed(tree.links):
         if link.parent not in children:
             raise InputError(
@@ -236,10 +212,10 @@ def _outwards(tree: RobotTree, where: str) -> Iterator[Body]:
 
 
 def _merge(body: MovedBody, where: str) -> None:
-    """Make a body the rigid union of its members."""
     body.mass = sum(mass for mass, _, _ in body.members)
     if not body.mass > 0.0:
         raise InputError(f"{where}: moving body {body.name!r} has no mass ({body.mass:g} kg)")
+    # a single member keeps its numbers to the bit: no sum, no division
     heavy = [member for member in body.members if member[0] > 0.0]
     _, body.com, body.inertia = heavy[0]
     if len(heavy) > 1:

@@ -6,14 +6,11 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..elementary.matrices import solve
+from ..elementary.matrices import Array, solve
 from .dynamics import mass_matrix
 from .placements import BodyFrame, base_axes, body_frames
 from .robot import Robot
-
-Array = NDArray[np.float64]
 
 
 def geared_joints(robot: Robot) -> list[int]:
@@ -63,6 +60,7 @@ class FlexibleModel(NamedTuple):
     def fastest(self) -> float:
         """Largest absolute eigenvalue, rad/s."""
         size = len(self.inertia)
+        # first-order form of M xdd + D xd + K x = 0
         system = np.zeros((2 * size, 2 * size))
         system[:size, size:] = np.eye(size)
         system[size:, :size] = -solve(self.inertia, self.stiffness)
@@ -74,7 +72,7 @@ def flexible_model(robot: Robot, joint_positions: Array) -> FlexibleModel:
     """Return the matrices of small motions about a configuration (N,), rad or m, at rest."""
     upright = np.array([1.0, 0.0, 0.0, 0.0])
     base = base_axes(upright[:, np.newaxis])
-    walk = body_frames(robot, (base[0], base[1], base[2]), joint_positions[:, np.newaxis])
+    walk = body_frames(robot, base, joint_positions[:, np.newaxis])
     rows, reflected = rotor_rows(robot, {frame.body: frame for frame in walk})
     size = 6 + robot.joint_count
     matrices = [np.zeros((size + len(rows), size + len(rows))) for _ in range(3)]
@@ -85,6 +83,7 @@ def flexible_model(robot: Robot, joint_positions: Array) -> FlexibleModel:
     for k, joint in enumerate(geared_joints(robot)):
         gear, places = robot.gears[joint], np.ix_((6 + joint, size + k), (6 + joint, size + k))
         assert gear
+        # the torque of a gear, K (theta_m - theta), acts on both sides
         couple = np.array([[1.0, -1.0], [-1.0, 1.0]])
         stiffness[places] += gear.stiffness * couple
         damping[places] += gear.damping * couple
@@ -111,7 +110,7 @@ def motor_momentum(
     if not motor_velocities.shape[1]:
         return total.T
     axes = base_axes(quaternion.T)
-    frames = {f.body: f for f in body_frames(robot, (axes[0], axes[1], axes[2]), joint_positions.T)}
+    frames = {f.body: f for f in body_frames(robot, axes, joint_positions.T)}
     for k, joint in enumerate(joints):
         gear = robot.gears[joint]
         assert gear

@@ -5,12 +5,9 @@ from __future__ import annotations
 from typing import Annotated
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import AfterValidator, Field
 
-from ..elementary.matrices import rotate_tensor
-
-Array = NDArray[np.float64]
+from ..elementary.matrices import Array, rotate_tensor
 
 
 def inertia_tensor(values: list[float]) -> Array:
@@ -49,8 +46,9 @@ LARGEST_MASS, LARGEST_INERTIA = 1e20, 1e20
 """Of a body, kg and kg m2: products of larger numbers overflow."""
 Mass = Annotated[float, Field(gt=0.0, le=LARGEST_MASS)]
 InertiaElement = Annotated[float, Field(ge=-LARGEST_INERTIA, le=LARGEST_INERTIA)]
-InertiaElements = Annotated[list[InertiaElement], Field(min_length=6, max_length=6)]
-Inertia = Annotated[InertiaElements, AfterValidator(check_inertia)]
+Inertia = Annotated[
+    list[InertiaElement], Field(min_length=6, max_length=6), AfterValidator(check_inertia)
+]
 
 LEAST_GYRATION = 1e-6
 """Radius of gyration below which a body counts as a point, m."""
@@ -93,10 +91,12 @@ def nearest_inertia(inertia: Array) -> Array | None:
     from ..elementary.linear_algebra import principal_axes  # slow to import
 
     moments, axes = principal_axes(inertia)
+    # eigenvalues of S, on the same axes
     second = 0.5 * np.sum(moments) - moments
     largest = float(np.max(second))
     if largest <= 0.0:
         return None
     second = np.maximum(second, SLENDER * largest)
     nearest = rotate_tensor(axes, np.diag(np.sum(second) - second))
+    # rounding has made it unsymmetric
     return 0.5 * (nearest + nearest.T)

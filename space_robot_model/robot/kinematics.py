@@ -5,24 +5,22 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from space_robot_msgs_py.config.arguments import as_numbers
 from space_robot_msgs_py.config.validation import short
 from space_robot_msgs_py.errors import InputError
 
 from ..dynamics.tool_kinematics import ToolKinematics, tool_kinematics_into
-from ..elementary.matrices import norm
+from ..elementary.matrices import Array, norm
 
 if TYPE_CHECKING:
     from ..dynamics.model import Model
     from .parts import Tool
 
-Array = NDArray[np.float64]
-
 
 class ModelledRobot(Protocol):
-    """What is needed of a `Robot`."""
+    """What is needed of a `Robot`, which imports this module."""
 
     @property
     def model(self) -> Model:
@@ -45,79 +43,31 @@ class ModelledRobot(Protocol):
         """All tools, the first one first."""
 
 
-class ToolState(NamedTuple):
-    """Pose and Jacobians of a tool, see `space_robot_model.dynamics.tool_kinematics`.
-
-    A twist is ``[v; w]``, m/s and rad/s, on inertial axes; columns are the robot's N joints,
-    passive ones last.
-    """
-
-    position: Array
-    """(3,) m, origin of the tool from the robot's centre of mass, inertial axes."""
-    centre_of_mass: Array
-    """(3,) m, the robot's centre of mass from the base's frame, inertial axes."""
-    rotation: Array
-    """(3, 3) from the tool's frame to the inertial frame."""
-    base: Array
-    """(6, 6) ``J_b``: twist by ``[v0; w0]``."""
-    joints: Array
-    """(6, N) ``J_m``: twist by joint velocities with the base fixed."""
-    attitude: Array
-    """(6, 3) ``J_w``: twist by ``w0``, linear momentum zero."""
-    held: Array
-    """(6, N) twist by joint velocities, attitude held, linear momentum zero."""
-    free: Array
-    """(6, N) ``J_g``: the same, base free, both momenta zero: the generalised Jacobian."""
-    turn: Array
-    """(3, N) ``w0`` of a free base by joint velocities, inertial axes."""
-    coupling: Array
-    """(3, N) angular momentum about the centre of mass by joint velocities, attitude held."""
-
-
 def tool_state(
     robot: ModelledRobot,
     quaternion_wxyz: ArrayLike,
     joint_positions: ArrayLike,
     tool: str | None = None,
-) -> ToolState:
-    """Return pose and Jacobians of a tool.
+) -> ToolKinematics:
+    """Return pose and Jacobians of a tool, with columns in the order of the robot's joints.
+
+    Only the matrices from its ``data`` on keep the order of the algorithms.
 
     Args:
         robot: the robot's numbers.
         quaternion_wxyz: (4,) base attitude, unit.
         joint_positions: (N,) of all joints, rad, or m of prismatic ones.
         tool: name of one of ``robot.tools``; None: the first.
-
-    Raises:
-        InputError: an argument has another type or shape, the quaternion is not unit, or there is
-            no such tool.
     """
     check_robot(robot)
-    n, order, columns = robot.joint_count, list(robot.order), list(robot.model_rows)
-    mounted, out = mounted_tool(robot, tool), ToolKinematics.allocate(n)
-    positions = vector(joint_positions, n, "joint_positions")[order]
+    order, columns = list(robot.order), list(robot.model_rows)
+    mounted, out = mounted_tool(robot, tool), ToolKinematics.allocate(robot.joint_count)
+    positions = vector(joint_positions, robot.joint_count, "joint_positions")[order]
     quaternion = unit_quaternion(quaternion_wxyz)
     tool_kinematics_into(robot.model, quaternion, positions, *mounted, out)
-    return ToolState(
-        out.position.copy(),
-        out.centre_of_mass.copy(),
-        out.rotation.copy(),
-        out.base.copy(),
-        out.joints[:, columns],
-        out.attitude.copy(),
-        out.held[:, columns],
-        out.free[:, columns],
-        out.turn[:, columns],
-        out.coupling[:, columns],
-    )
-
-
-def manipulability(jacobian: Array) -> float:
-    """Return ``sqrt(det(J J^T))`` of Yoshikawa (1985): zero in a singular posture.
-
-    With the generalised Jacobian a posture where it is zero is a dynamic singularity.
-    """
-    return float(np.prod(np.linalg.svd(jacobian, compute_uv=False)))
+    for matrix in (out.joints, out.held, out.free, out.turn, out.coupling):
+        matrix[:] = matrix[:, columns]
+    return out
 
 
 class MountedTool(NamedTuple):

@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from space_robot_msgs_py.samples import Timebase
 from space_robot_msgs_py.wire.viewers import CUBE, CYLINDER, MESH, SPHERE, Marker, MarkersCodec
 
+from ..elementary.matrices import Array
+from ..elementary.rotations import quaternion_of_rotation
 from .parts import Visual
-from .placements import frame_names, wxyz
+from .placements import frame_names
 from .robot import Robot
 from .shapes import LINK_COLOUR, shapes_of
 from .urdf_text import mesh_address
 
-Array = NDArray[np.float64]
 Pose = tuple[float, float, float, float, float, float, float]
 """Position x, y, z, m, and quaternion x, y, z, w."""
 
@@ -83,7 +83,7 @@ def _on(outer: Pose, inner: Pose) -> Pose:
 
 def _pose(shape: Visual) -> Pose:
     x, y, z = map(float, shape.position)
-    w, a, b, c = map(float, wxyz(shape.rotation))
+    w, a, b, c = map(float, quaternion_of_rotation(shape.rotation))
     return x, y, z, a, b, c, w
 
 

@@ -53,7 +53,7 @@ class Orientation(StrictModel):
     quaternion: Quaternion | None = Field(None, description="w, x, y, z")
 
     @model_validator(mode="after")
-    def _is_unit(self) -> Orientation:
+    def _check_orientation(self) -> Orientation:
         if self.rpy_deg is not None and self.quaternion is not None:
             raise ValueError("rpy_deg and quaternion were given: give one of them")
         if self.quaternion is not None:
@@ -77,7 +77,7 @@ class Attitude(Orientation):
     """An orientation that must be given: that of the base."""
 
     @model_validator(mode="after")
-    def _must_be_given(self) -> Attitude:
+    def _check_given(self) -> Attitude:
         if not self.is_given:
             raise ValueError("give rpy_deg or quaternion")
         return self
@@ -91,7 +91,7 @@ class StartBase(Orientation):
     )
 
     @model_validator(mode="after")
-    def _something(self) -> StartBase:
+    def _check_any(self) -> StartBase:
         if not self.model_fields_set:
             raise ValueError("give rpy_deg, quaternion, rate_deg_s, or point")
         return self
@@ -155,9 +155,6 @@ def mission_layer(path: Path, node: str, robot: str) -> Tree:
         path: of the file.
         node: plant or mission.
         robot: name or path of the robot, whose joints are the columns of a trajectory.
-
-    Raises:
-        InputError: the file cannot be read, or is none of these.
     """
     if path.suffix in TRAJECTORIES:
         settings = trajectory_document(path, robot).parameters()
@@ -169,11 +166,7 @@ def mission_layer(path: Path, node: str, robot: str) -> Tree:
 
 
 def document_settings(content: Mapping[str, Any], where: str) -> Tree:
-    """Return a mission's document as settings of mission and plant.
-
-    Raises:
-        InputError: naming ``where``, key, value given and values allowed.
-    """
+    """Return a mission's document as settings of mission and plant."""
     return validate(MissionDocument, content, where).parameters()
 
 

@@ -7,16 +7,10 @@ from functools import reduce
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..elementary.matrices import product
-from .placements import BodyFrame, base_axes, body_frames, cross, to_base, to_inertial
+from ..elementary.matrices import Array, product
+from .placements import BATCH, BodyFrame, base_axes, body_frames, cross, to_base, to_inertial
 from .robot import Robot
-
-Array = NDArray[np.float64]
-
-_BATCH = 8192
-"""Rows per batch, so that all vectors of a batch fit into the processor's cache."""
 
 
 class Motion(NamedTuple):
@@ -60,19 +54,12 @@ def robot_momentum(robot: Robot, motion: Motion) -> RobotMomentum:
 
     ``r`` and ``v`` are those of the common CoM, so the velocity of the base is not needed. Wheels
     count as locked to the base; their spin momentum is not included.
-
-    Raises:
-        ValueError: an array has the wrong shape.
     """
-    rows, n = len(motion.quaternion), robot.joint_count
-    wanted = ((rows, 4), (rows, 3), (rows, n), (rows, n))
-    for name, array, shape in zip(motion._fields, motion, wanted, strict=True):
-        if array.shape != shape:
-            raise ValueError(f"{name}: shape {shape} was expected, got {array.shape}")
+    rows = len(motion.quaternion)
     momentum = RobotMomentum(*(np.empty((rows, 3)) for _ in RobotMomentum._fields))
     mass = float(np.sum(robot.mass))
-    for start in range(0, rows, _BATCH):
-        part = slice(start, start + _BATCH)
+    for start in range(0, rows, BATCH):
+        part = slice(start, start + BATCH)
         bodies = list(_bodies(robot, Motion(*(array[part].T for array in motion))))
         centre = _sum(body.mass * body.com for body in bodies) / mass
         velocity = _sum(body.mass * body.velocity for body in bodies) / mass
@@ -95,10 +82,11 @@ def _bodies(robot: Robot, motion: Motion) -> Iterator[_Body]:
     omega = {0: to_inertial(axes, motion.omega_base)}
     frames: dict[int, BodyFrame] = {}
     velocity = {0: np.zeros_like(omega[0])}
-    for frame in body_frames(robot, (axes[0], axes[1], axes[2]), motion.joint_positions):
+    for frame in body_frames(robot, axes, motion.joint_positions):
         body, joint = frame.body, frame.body - 1
         if body:
             parent, rate = int(robot.parent[joint]), motion.joint_velocities[joint]
+            # also of a prismatic joint: its link turns with the parent about the parent's origin
             link = frame.origin - frames[parent].origin
             velocity[body] = velocity[parent] + cross(omega[parent], link)
             omega[body] = omega[parent]
@@ -111,7 +99,6 @@ def _bodies(robot: Robot, motion: Motion) -> Iterator[_Body]:
 
 
 def _body(robot: Robot, frame: BodyFrame, velocity: Array, omega: Array) -> _Body:
-    """Return the body of a frame that moves with ``velocity``."""
     turn = np.array((frame.x, frame.y, frame.z))
     arm = frame.on_outer_axes(robot.com[frame.body])
     spin = to_inertial(turn, product(robot.inertia[frame.body], to_base(turn, omega)))

@@ -8,11 +8,11 @@ to the last bit.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import InitVar, dataclass, field, replace
-from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple
+from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import (
     AfterValidator,
     BeforeValidator,
@@ -30,12 +30,10 @@ from typing_extensions import Self
 from space_robot_msgs_py.config.text import choices
 from space_robot_msgs_py.config.validation import short
 
-from ..elementary.matrices import norm, product
+from ..elementary.matrices import Array, norm, product
 from ..elementary.rotations import exact_sines_cosines, rotation_of_rpy
 from .inertia import LARGEST_MASS, InertiaElement, check_inertia, inertia_tensor
 from .names import BASE, first_repeated, other_meaning
-
-Array = NDArray[np.float64]
 
 MOST_LINKS = 4000
 """Maximum number of links in a robot's file, including fixed ones."""
@@ -61,8 +59,8 @@ def _array(items: Any) -> GetPydanticSchema:
 
 
 Triple = Annotated[list[Number], Field(min_length=3, max_length=3)]
-Vector = Annotated[Array, _array(Triple)]
-Matrix = Annotated[Array, _array(Annotated[list[Triple], Field(min_length=3, max_length=3)])]
+Vector3 = Annotated[Array, _array(Triple)]
+Matrix3 = Annotated[Array, _array(Annotated[list[Triple], Field(min_length=3, max_length=3)])]
 Moments = Annotated[
     Array,
     _array(
@@ -81,11 +79,13 @@ class RobotPart:
     """
 
     __pydantic_config__ = ConfigDict(
-        extra="forbid", allow_inf_nan=False, coerce_numbers_to_str=True
+        # YAML reads a link called 1 as a number
+        extra="forbid",
+        allow_inf_nan=False,
+        coerce_numbers_to_str=True,
     )
 
     def _set(self, **values: Any) -> None:
-        """Complete a frozen part that is being made."""
         for name, value in values.items():
             object.__setattr__(self, name, value)
 
@@ -115,7 +115,7 @@ class LimitsInDegrees(RobotPart):
     effort: Annotated[Real, Field(gt=0.0)] | None = None
 
     @model_validator(mode="after")
-    def _in_order(self) -> Self:
+    def _check_order(self) -> Self:
         if self.position_deg and not self.position_deg[0] < self.position_deg[1]:
             raise ValueError("position_deg must be a lower and a higher limit, in this order")
         return self
@@ -210,17 +210,18 @@ def _spring(value: Any, spring: ValidatorFunctionWrapHandler, info: ValidationIn
 Drive = Annotated[Gear, BeforeValidator(_with_gear_ratio)]
 
 
-def _is_direction(vector: Array, info: ValidationInfo) -> Array:
+def _check_direction(vector: Array, info: ValidationInfo) -> Array:
     if not norm(vector) > 1e-9:
         raise ValueError(f"the {info.field_name} must not be zero")
     return vector
 
 
-Direction = Annotated[Vector, AfterValidator(_is_direction)]
+Direction = Annotated[Vector3, AfterValidator(_check_direction)]
 
 
 def _tensor(elements: Array, is_checked: bool = True) -> Array:
     """Return the (3, 3) tensor of the six elements in files, or of the nine of a program."""
+    # nine numbers keep every bit: a tensor computed by a program is not quite symmetric
     if len(elements) == 9:
         return elements.reshape(3, 3)
     values = elements.tolist()
@@ -236,19 +237,19 @@ class Base(RobotPart):
     mass: Annotated[Real, Field(gt=0.0, le=LARGEST_MASS)]
     inertia: Moments
     """(3, 3) about its centre of mass; in files ``[Ixx, Iyy, Izz, Ixy, Ixz, Iyz]``."""
-    com: Vector = field(default_factory=lambda: np.zeros(3))
+    com: Vector3 = field(default_factory=lambda: np.zeros(3))
     """(3,) centre of mass, m: the robot's frame is put there."""
     name: Name = BASE
 
-    _is_physical = field_validator("inertia", mode="after")(lambda tensor: _tensor(tensor))
+    _check_inertia = field_validator("inertia", mode="after")(lambda tensor: _tensor(tensor))
 
 
 @dataclass(frozen=True)
 class Origin(RobotPart):
     """A frame relative to its parent: position, m, and rotations about the parent's x, y, z."""
 
-    xyz: Vector = field(default_factory=lambda: np.zeros(3))
-    rpy_deg: Vector = field(default_factory=lambda: np.zeros(3))
+    xyz: Vector3 = field(default_factory=lambda: np.zeros(3))
+    rpy_deg: Vector3 = field(default_factory=lambda: np.zeros(3))
 
     @property
     def rotation(self) -> Array:
@@ -272,10 +273,11 @@ class Framed(RobotPart):
         has_parameters = (alpha_deg, a, d) != (None, None, None)
         if origin and has_parameters:
             raise ValueError("a frame has either origin, or alpha_deg, a and d, not both")
-        if origin:
+        if origin:  # a position in parent axes; the offset is on the joint's
             rotation = origin.rotation
             self._take(rotation, product(rotation.T, origin.xyz))
         elif has_parameters:
+            # Rx(alpha) Tx(a) Rz(theta) Tz(d): at zero a is along x, d along z of this frame
             s, c = exact_sines_cosines(np.radians(alpha_deg or 0.0))  # exact at right angles
             turn = np.array([[1.0, 0.0, 0.0], [0.0, c, -s], [0.0, s, c]])
             self._take(turn, np.array([a or 0.0, 0.0, d or 0.0]))
@@ -289,9 +291,9 @@ class Framed(RobotPart):
 class Body(Framed):
     """A body, and the joint between it and its parent; its vectors are in the axes of its frame."""
 
-    rotation: Matrix = field(default_factory=lambda: np.eye(3))
+    rotation: Matrix3 = field(default_factory=lambda: np.eye(3))
     """(3, 3) axes of the frame at joint position zero, as columns, in parent axes."""
-    offset: Vector = field(default_factory=lambda: np.zeros(3))
+    offset: Vector3 = field(default_factory=lambda: np.zeros(3))
     """(3,) from the parent's frame to this one at zero, m, in the axes of *this* frame."""
     name: Name
     parent: str = ""
@@ -306,7 +308,7 @@ class Body(Framed):
     """Mass, kg; 0 only for links on fixed joints."""
     inertia: Moments
     """(3, 3) about its centre of mass, kg m2; in files ``[Ixx, Iyy, Izz, Ixy, Ixz, Iyz]``."""
-    com: Vector
+    com: Vector3
     """(3,) centre of mass, m."""
     limits: Limits = UNLIMITED
     friction: JointFriction | None = None
@@ -328,36 +330,36 @@ class Body(Framed):
 
     @field_validator("mass", mode="after")
     @classmethod
-    def _moves_mass(cls, mass: float, info: ValidationInfo) -> float:
+    def _check_mass(cls, mass: float, info: ValidationInfo) -> float:
         if mass == 0.0 and info.data.get("joint") != "fixed":
             raise ValueError("a moving link must have a mass greater than 0")
         return mass
 
     @field_validator("inertia", mode="after")
     @classmethod
-    def _is_physical(cls, elements: Array, info: ValidationInfo) -> Array:
+    def _check_inertia(cls, elements: Array, info: ValidationInfo) -> Array:
         return _tensor(elements, is_checked=info.data.get("mass") != 0.0)
 
     @field_validator("friction", "passive", "drive", mode="after")
     @classmethod
-    def _moves(cls, part: Any, info: ValidationInfo) -> Any:
+    def _check_moves(cls, part: Any, info: ValidationInfo) -> Any:
         if part and info.data.get("joint") == "fixed":
             raise ValueError("a fixed link cannot have friction, a spring or a drive")
         return part
 
     @field_validator("drive", mode="after")
     @classmethod
-    def _has_motor(cls, drive: Gear | None, info: ValidationInfo) -> Gear | None:
+    def _check_motor(cls, drive: Gear | None, info: ValidationInfo) -> Gear | None:
         if drive and info.data.get("passive"):
             raise ValueError(f"{info.data.get('name')!r} is passive, only a motor can have a drive")
         return drive
 
 
-def _not_in_files(_: Any) -> int:
+def _refuse_in_files(_: Any) -> int:
     raise ValueError("unknown key: the key of a body is link")
 
 
-BodyNumber = Annotated[int, BeforeValidator(_not_in_files), Field(exclude=True)]
+BodyNumber = Annotated[int, BeforeValidator(_refuse_in_files), Field(exclude=True)]
 
 
 @dataclass(frozen=True)
@@ -365,9 +367,9 @@ class Tool(Framed):
     """Frame of an end effector on a link."""
 
     name: Name = "tool"
-    rotation: Matrix = field(default_factory=lambda: np.eye(3))
+    rotation: Matrix3 = field(default_factory=lambda: np.eye(3))
     """(3, 3) its axes, as columns, in the link's axes."""
-    position: Vector = field(default_factory=lambda: np.zeros(3))
+    position: Vector3 = field(default_factory=lambda: np.zeros(3))
     """(3,) position, m, in the link's axes."""
     body: BodyNumber = 0
     """Number of its body in a `Robot`."""
@@ -389,9 +391,9 @@ class Visual(RobotPart):
     shape: Literal["box", "cylinder", "sphere", "mesh"]
     size: tuple[Real, ...]
     """m: edges x, y, z; radius and length along z; radius; or scale x, y, z of a mesh."""
-    rotation: Matrix = field(default_factory=lambda: np.eye(3))
+    rotation: Matrix3 = field(default_factory=lambda: np.eye(3))
     """(3, 3) its axes, as columns, in the link's axes."""
-    position: Vector = field(default_factory=lambda: np.zeros(3))
+    position: Vector3 = field(default_factory=lambda: np.zeros(3))
     """(3,) position, m, in the link's axes."""
     mesh: str = ""
     """File of the mesh; its name in a URDF if the file does not exist."""
@@ -408,7 +410,7 @@ class Visual(RobotPart):
             self._set(rotation=origin.rotation, position=np.array(origin.xyz))
 
     @model_validator(mode="after")
-    def _is_whole(self) -> Self:
+    def _check_shape(self) -> Self:
         is_mesh = self.shape == "mesh"
         if len(self.size) != SIZES[self.shape] or not (is_mesh or min(self.size) > 0.0):
             what = "numbers" if is_mesh else "numbers above 0"
@@ -427,7 +429,7 @@ class Plate(RobotPart):
     """m2."""
     normal: Direction
     """(3,) unit vector outwards, in the link's axes."""
-    centre: Vector = field(default_factory=lambda: np.zeros(3))
+    centre: Vector3 = field(default_factory=lambda: np.zeros(3))
     """(3,) m, in the link's axes."""
     drag_coefficient: Annotated[Real, Field(ge=0.0, le=10.0)] = 2.2
     specular: Share = 0.2
@@ -439,7 +441,7 @@ class Plate(RobotPart):
     link: Name = BASE
 
     @model_validator(mode="after")
-    def _reflects_what_comes(self) -> Self:
+    def _check_reflection(self) -> Self:
         if self.specular + self.diffuse > 1.0:
             raise ValueError(
                 "specular and diffuse are shares of the same light: their sum must be at most 1, "
@@ -454,9 +456,24 @@ class Plate(RobotPart):
 
 
 Plates = Annotated[list[Plate], Field(max_length=MOST_PLATES)]
+Part = TypeVar("Part", Tool, Visual, Plate)
 
 
-def _distinct_joints(links: list[Body]) -> list[Body]:
+def moved(part: Part, rotation: Array, move: Callable[[Array], Array], **names: Any) -> Part:
+    """Return a part in another frame: its axes or normal turned, its origin or centre moved.
+
+    Args:
+        part: of a link.
+        rotation: (3, 3) of its directions.
+        move: of a position (3,), m.
+        names: of its link and body there.
+    """
+    axes, at = ("normal", "centre") if isinstance(part, Plate) else ("rotation", "position")
+    names[axes], names[at] = product(rotation, getattr(part, axes)), move(getattr(part, at))
+    return replace(part, **names)
+
+
+def _check_joint_names(links: list[Body]) -> list[Body]:
     names = [link.joint_label for link in links]
     if (repeated := first_repeated(names)) is not None:
         raise ValueError(f"joint names must differ, {short(repeated)} occurs twice")
@@ -480,7 +497,7 @@ class RobotTree(RobotPart):
     name: Name
     base: Base
     links: Annotated[
-        list[Body], Field(min_length=1, max_length=MOST_LINKS), AfterValidator(_distinct_joints)
+        list[Body], Field(min_length=1, max_length=MOST_LINKS), AfterValidator(_check_joint_names)
     ]
     tool: Tool | None = None
     """The only tool, in files."""
@@ -493,7 +510,7 @@ class RobotTree(RobotPart):
 
     @field_validator("tool", "tools", "plates", "visuals", mode="after")
     @classmethod
-    def _are_on_links(cls, parts: Any, info: ValidationInfo) -> Any:
+    def _check_links(cls, parts: Any, info: ValidationInfo) -> Any:
         what = str(info.field_name).removesuffix("s")
         if what == "tool" and isinstance(parts, list):
             if parts and info.data.get("tool"):
@@ -513,8 +530,9 @@ class RobotTree(RobotPart):
         return parts
 
     @model_validator(mode="after")
-    def _completed(self) -> Self:
+    def _complete(self) -> Self:
         """Fill in what a file may leave out: parents, tools, and lengths of directions."""
+        # a program has filled them in, and a division would change last bits
         if self.exact:
             return self
         links, above = [], self.base.name

@@ -6,24 +6,22 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from space_robot_msgs_py.samples import RobotState
 from space_robot_msgs_py.topics import BASE_FRAME, INERTIAL_FRAME
 from space_robot_msgs_py.wire.viewers import POSE, FramePair
 
 from ..elementary.functions import sines_cosines
-from ..elementary.matrices import norm
+from ..elementary.matrices import Array
+from ..elementary.rotations import quaternion_of_rotation
 from .names import BASE
 from .robot import Robot
-
-Array = NDArray[np.float64]
 
 XYZW = [1, 2, 3, 0]
 """Indices that bring a quaternion ``[w, x, y, z]`` into ROS's order."""
 WXYZ = [3, 0, 1, 2]
 """The inverse of `XYZW`."""
-_BATCH = 8192
+BATCH = 8192
 """Rows per batch, so that all vectors of a batch fit into the processor's cache."""
 
 
@@ -75,17 +73,15 @@ class BodyFrame(NamedTuple):
         return turned
 
 
-def body_frames(
-    robot: Robot, base_axes: tuple[Array, Array, Array], joint_positions: Array
-) -> Iterator[BodyFrame]:
+def body_frames(robot: Robot, axes: Array, joint_positions: Array) -> Iterator[BodyFrame]:
     """Yield the frame of the base, then of every body, parents before children.
 
     Args:
         robot: its masses are not used.
-        base_axes: x, y and z axis of the base, (3, T) each.
+        axes: (3, 3, T) of the base, those of `base_axes` for an inertial outer frame.
         joint_positions: (N, T) of all joints, rad, or m for prismatic ones.
     """
-    frames = {0: BodyFrame(0, *base_axes, np.zeros_like(base_axes[0]))}
+    frames = {0: BodyFrame(0, axes[0], axes[1], axes[2], np.zeros_like(axes[0]))}
     yield frames[0]
     for joint in robot.order:
         _, x, y, z, origin = frames[int(robot.parent[joint])]
@@ -102,7 +98,7 @@ def body_frames(
 
 
 def _combined(vectors: tuple[Array, Array, Array], factors: Array) -> Array:
-    """Return the linear combination of the vectors, skipping the factors that are zero."""
+    # most factors are zero or one, and rows are long: zeros are skipped
     terms = [
         factor * vector for factor, vector in zip(factors, vectors, strict=True) if factor != 0.0
     ]
@@ -123,32 +119,18 @@ def tool_pose(robot: Robot, quaternion: Array, joint_positions: Array) -> tuple[
     Returns:
         (N, 3, 3) rotation from the tool's frame to the inertial one; (N, 3) position, m, inertial
         axes.
-
-    Raises:
-        ValueError: an argument has a wrong shape.
     """
     rows = len(quaternion)
-    if quaternion.shape != (rows, 4) or joint_positions.shape != (rows, robot.joint_count):
-        raise ValueError(
-            f"shapes (N, 4) and (N, {robot.joint_count}) were expected, "
-            f"got {quaternion.shape} and {joint_positions.shape}"
-        )
     rotation, position = np.empty((rows, 3, 3)), np.empty((rows, 3))
-    for start in range(0, rows, _BATCH):
-        part = slice(start, start + _BATCH)
-        axes, at = _tool(robot, quaternion[part].T, joint_positions[part].T)
-        rotation[part], position[part] = axes.transpose(2, 1, 0), at.T
-    return rotation, position
-
-
-def _tool(robot: Robot, quaternion: Array, positions: Array) -> tuple[Array, Array]:
-    """Return the tool's axes (3, 3, T), as rows, and position (3, T), m, from (4, T), (N, T)."""
     tool = robot.tool
-    x, y, z = base_axes(quaternion)
-    frames = body_frames(robot, (x, y, z), positions)
-    carrier = next(frame for frame in frames if frame.body == tool.body)
-    axes = np.array([carrier.on_outer_axes(tool.rotation[:, k]) for k in range(3)])
-    return axes, carrier.origin + carrier.on_outer_axes(tool.position)
+    for start in range(0, rows, BATCH):
+        part = slice(start, start + BATCH)
+        frames = body_frames(robot, base_axes(quaternion[part].T), joint_positions[part].T)
+        carrier = next(frame for frame in frames if frame.body == tool.body)
+        for k in range(3):
+            rotation[part, :, k] = carrier.on_outer_axes(tool.rotation[:, k]).T
+        position[part] = (carrier.origin + carrier.on_outer_axes(tool.position)).T
+    return rotation, position
 
 
 class FrameNames(NamedTuple):
@@ -231,6 +213,7 @@ class RobotPoses:
         self._sliding, self._turning = order[self.slides[1:]], order[~self.slides[1:]]
         self._slid, self._turned = np.flatnonzero(self.slides), 1 + np.flatnonzero(~self.slides[1:])
         self._axes = robot.rotation[self._sliding][:, :, 2]
+        # a turn about z only mixes x with y and z with w, so two products make the quaternion
         x, y, z, w = self._at_zero[self._turned, 3:].T
         # factors of the cosine and of the sine in q0 (cos theta/2, 0, 0, sin theta/2)
         self._even, self._odd = np.column_stack((x, y, z, w)), np.column_stack((y, -x, w, -z))
@@ -286,7 +269,12 @@ def tool_transforms(robot: Robot) -> list[Transform]:
     """Return the fixed transforms of the tools."""
     names = frame_names(robot)
     return [
-        Transform(names.bodies[tool.body], name, tool.position[None], wxyz(tool.rotation)[None])
+        Transform(
+            names.bodies[tool.body],
+            name,
+            tool.position[None],
+            quaternion_of_rotation(tool.rotation)[None],
+        )
         for tool, name in zip(robot.tools, names.tools, strict=True)
     ]
 
@@ -299,22 +287,4 @@ def tool_poses(robot: Robot) -> tuple[tuple[FramePair, ...], Array]:
 
 
 def _pose(rotation: Array, position: Array) -> Array:
-    return np.append(position, wxyz(rotation)[XYZW])
-
-
-def wxyz(rotation: Array) -> Array:
-    """Return the unit quaternion ``[w, x, y, z]`` of a rotation matrix (3, 3).
-
-    Importing SciPy's function would delay the plant by 0.25 s.
-    """
-    (a, b, c), (d, e, f), (g, h, i) = rotation
-    products = np.array(  # 4 q q^T; the row with the largest square is the most accurate
-        [
-            [1.0 + a + e + i, h - f, c - g, d - b],
-            [h - f, 1.0 + a - e - i, b + d, c + g],
-            [c - g, b + d, 1.0 - a + e - i, f + h],
-            [d - b, c + g, f + h, 1.0 - a - e + i],
-        ]
-    )
-    row: Array = products[np.argmax(np.diag(products))]
-    return row / norm(row)
+    return np.append(position, quaternion_of_rotation(rotation)[XYZW])

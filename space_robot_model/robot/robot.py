@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -20,10 +20,10 @@ from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.topics import BASE_AXES
 
 from ..dynamics.model import Model
-from ..elementary.matrices import product
+from ..elementary.matrices import Array, product
 from ..elementary.rotations import plain_sin_cos
 from .files import exact_document, read_content
-from .flatten import Part, arrays_of
+from .flatten import robot_arrays
 from .inertia import inertia_elements, inertia_tensor
 from .parts import (
     UNLIMITED,
@@ -32,6 +32,7 @@ from .parts import (
     Gear,
     JointFriction,
     JointLimits,
+    Part,
     Plate,
     RobotTree,
     Spring,
@@ -40,7 +41,6 @@ from .parts import (
 )
 from .urdf import UrdfRobot, read_urdf
 
-Array = NDArray[np.float64]
 RANK_TOLERANCE = 1e-7
 """Singular values below this share of the largest count as zero."""
 
@@ -140,13 +140,13 @@ class Robot:
         return BASE_AXES + self.joint_names
 
     @classmethod
-    def of_tree(cls, tree: RobotTree, where: str = "robot") -> Robot:
+    def from_tree(cls, tree: RobotTree, where: str = "robot") -> Robot:
         """Build the arrays from the parts of a robot, see `space_robot_model.robot.flatten`.
 
         Raises:
             InputError: not a tree, or one that cannot be flown; ``where`` names the file.
         """
-        return cls(**arrays_of(tree, where))
+        return cls(**robot_arrays(tree, where))
 
     @classmethod
     def from_yaml(cls, path: str | Path) -> Robot:
@@ -176,8 +176,8 @@ class Robot:
             raise InputError(f"{where}: a mapping was expected, got {short(content)}")
         read = read_content(content, folder or Path(), where)
         if isinstance(read, RobotTree):
-            return replace(cls.of_tree(read, where), source=where)
-        return cls._of_urdf(read, where)
+            return replace(cls.from_tree(read, where), source=where)
+        return cls._from_urdf(read, where)
 
     @classmethod
     def from_urdf(cls, path: str | Path, base: str | None = None, repair: bool = False) -> Robot:
@@ -192,12 +192,12 @@ class Robot:
             InputError: invalid file; names link or joint, line, value and the repair, if any.
         """
         file = as_path(path, "path")
-        return cls._of_urdf(read_urdf(file, base, repair), str(file))
+        return cls._from_urdf(read_urdf(file, base, repair), str(file))
 
     @classmethod
-    def _of_urdf(cls, urdf: UrdfRobot, where: str) -> Robot:
+    def _from_urdf(cls, urdf: UrdfRobot, where: str) -> Robot:
         repairs = tuple(map(str, urdf.findings))
-        return replace(cls.of_tree(urdf.tree, where), repairs=repairs, source=where)
+        return replace(cls.from_tree(urdf.tree, where), repairs=repairs, source=where)
 
     def _repr_html_(self) -> str:
         """Show bodies, joints and limits in a notebook."""
@@ -205,7 +205,7 @@ class Robot:
 
     @property
     def tree(self) -> RobotTree:
-        """The parts from which `of_tree` builds this robot, branch by branch."""
+        """The parts from which `from_tree` builds this robot, branch by branch."""
         base = Base(float(self.mass[0]), self.inertia[0], self.com[0], self.body_names[0])
         return RobotTree(
             self.name,
@@ -254,14 +254,10 @@ class Robot:
             return self
         tree = self.tree  # with the order of the actuated joints
         links = [_locked(link, link.passive.rest) if link.passive else link for link in tree.links]
-        return Robot.of_tree(replace(tree, links=links))
+        return Robot.from_tree(replace(tree, links=links))
 
     def with_springs(self, springs: Mapping[str, Spring]) -> Robot:
-        """Return the robot with springs instead of motors in those of its joints that are named.
-
-        Raises:
-            InputError: no joint with a motor is left.
-        """
+        """Return the robot with springs instead of motors in those of its joints that are named."""
         if not springs:
             return self
         tree = self.tree
@@ -271,26 +267,23 @@ class Robot:
             else link
             for link in tree.links
         ]
-        return replace(Robot.of_tree(replace(tree, links=links), self.where), source=self.source)
+        return replace(Robot.from_tree(replace(tree, links=links), self.where), source=self.source)
 
     def from_degrees(self, values: ArrayLike) -> Array:
         """Convert positions of the n actuated joints to rad; m of prismatic joints are kept.
 
         Args:
             values: (..., n) in degrees, or m for prismatic joints.
-
-        Raises:
-            InputError: not numbers, or not n.
         """
-        numbers, n = self._of_joints(values), self.n
+        numbers, n = self._joint_numbers(values), self.n
         return np.where(self.is_prismatic[:n], numbers, np.radians(numbers))
 
     def to_degrees(self, values: ArrayLike) -> Array:
         """Convert positions (..., n) in rad to degrees; m of prismatic joints are kept."""
-        numbers, n = self._of_joints(values), self.n
+        numbers, n = self._joint_numbers(values), self.n
         return np.where(self.is_prismatic[:n], numbers, np.degrees(numbers))
 
-    def _of_joints(self, values: ArrayLike) -> Array:
+    def _joint_numbers(self, values: ArrayLike) -> Array:
         numbers = as_numbers(values, "values")
         if numbers.shape[-1:] != (self.n,):
             raise InputError(
@@ -340,14 +333,12 @@ class Robot:
         1992): a column (N,) each, N - 3 of them in general.
 
         Args: see `tool_jacobian`.
-
-        Raises:
-            InputError: an argument has another type or shape.
         """
         from .kinematics import tool_state
 
         coupling = tool_state(self, quaternion_wxyz, joint_positions).coupling
         _, values, axes = np.linalg.svd(coupling)
+        # rows of V^T beyond the rank span the null space
         rank = np.count_nonzero(values > RANK_TOLERANCE * values.max(initial=0.0))
         basis: Array = axes[rank:].T
         return basis
@@ -371,8 +362,28 @@ class Robot:
 
     @cached_property
     def model(self) -> Model:
-        """The constants of the compiled algorithms."""
-        return model_of(self)
+        """The constants of the compiled algorithms, with joints in the order of visits."""
+        model, count, order = Model.allocate(self.n), self.joint_count, list(self.order)
+        bodies = [0, *(joint + 1 for joint in order)]
+        row_of_body = {body: row for row, body in enumerate(bodies)}
+        assign(model, joint_count=count, actuated_count=self.n)
+        model.mass[: count + 1] = self.mass[bodies]
+        model.inertia[: count + 1] = inertia_elements(self.inertia[bodies])
+        model.com[: count + 1] = self.com[bodies]
+        model.rotation[:count] = self.rotation[order].reshape(count, 9)
+        model.offset[:count] = self.offset[order]
+        model.is_prismatic[:count] = self.is_prismatic[order]
+        for row, joint in enumerate(order):
+            parent = row_of_body[int(self.parent[joint])]
+            model.row[joint], model.parent[row] = row, parent
+            # the parent was visited just before: its values are still in registers
+            model.continues[row] = parent == row
+            if parent != row:
+                model.branches[parent] = 1.0
+            if joint >= self.n:
+                spring = self.springs[joint - self.n]
+                model.stiffness[row], model.damping[row], model.rest[row] = spring
+        return model
 
 
 def _locked(link: Body, position: float) -> Body:
@@ -383,6 +394,7 @@ def _locked(link: Body, position: float) -> Body:
     else:
         s, c = plain_sin_cos(position)
         turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+        # the offset is in the link's own axes, which have turned
         offset, rotation = product(turn.T, offset), product(rotation, turn)
     return replace(
         link,
@@ -395,55 +407,23 @@ def _locked(link: Body, position: float) -> Body:
     )
 
 
-def model_of(robot: Robot) -> Model:
-    """Return the `Model` of a robot, with joints in the order of visits."""
-    model, count, order = Model.allocate(robot.n), robot.joint_count, list(robot.order)
-    bodies = [0, *(joint + 1 for joint in order)]
-    row_of_body = {body: row for row, body in enumerate(bodies)}
-    assign(model, joint_count=count, actuated_count=robot.n)
-    model.mass[: count + 1] = robot.mass[bodies]
-    model.inertia[: count + 1] = inertia_elements(robot.inertia[bodies])
-    model.com[: count + 1] = robot.com[bodies]
-    model.rotation[:count] = robot.rotation[order].reshape(count, 9)
-    model.offset[:count] = robot.offset[order]
-    model.is_prismatic[:count] = robot.is_prismatic[order]
-    for row, joint in enumerate(order):
-        parent = row_of_body[int(robot.parent[joint])]
-        model.row[joint], model.parent[row] = row, parent
-        model.continues[row] = parent == row
-        if parent != row:
-            model.branches[parent] = 1.0
-        if joint >= robot.n:
-            spring = robot.springs[joint - robot.n]
-            model.stiffness[row], model.damping[row], model.rest[row] = spring
-    return model
-
-
 HTML_HEADS = ("body", "mass, kg", "moved by", "on", "range", "velocity", "effort")
 
 
 def _html(robot: Robot) -> str:
-    """Return the table of a robot: a row per body, with the joint that moves it."""
-    passive = len(robot.passive_names)
+    passive, masses = len(robot.passive_names), [f"{mass:.6g}" for mass in robot.mass]
     words = [
         f"{robot.name}: {float(robot.mass.sum()):g} kg",
         f"{robot.n} joints with a motor",
         *([f"{passive} with a spring"] if passive else []),
-        *([f"tools: {', '.join(tool.name for tool in robot.tools)}"] if robot.tools else []),
+        f"tools: {', '.join(tool.name for tool in robot.tools)}",
     ]
-    return html_table(HTML_HEADS, _html_rows(robot), ", ".join(words))
-
-
-def _html_rows(robot: Robot) -> Iterator[list[str]]:
-    yield [robot.body_names[0], f"{robot.mass[0]:.6g}", *[""] * 5]
-    for number, joint in enumerate(robot.all_joint_names):
-        yield [
-            robot.body_names[number + 1],
-            f"{robot.mass[number + 1]:.6g}",
-            joint,
-            robot.body_names[robot.parent[number]],
-            *_html_limits(robot, number),
-        ]
+    rows = [[robot.body_names[0], masses[0], *[""] * 5]]
+    for joint, name in enumerate(robot.all_joint_names):
+        carrier = robot.body_names[robot.parent[joint]]
+        moved = [robot.body_names[joint + 1], masses[joint + 1], name, carrier]
+        rows.append([*moved, *_html_limits(robot, joint)])
+    return html_table(HTML_HEADS, rows, ", ".join(words))
 
 
 def _html_limits(robot: Robot, number: int) -> list[str]:

@@ -3,19 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..elementary.matrices import product
-from .parts import Colour, Plate, Visual
+from ..elementary.matrices import Array, product
+from .parts import Colour, Plate, Visual, moved
 
 if TYPE_CHECKING:
     from .robot import Robot
 
-Array = NDArray[np.float64]
 BASE_COLOUR: Colour = (0.80, 0.66, 0.30, 1.0)
 LINK_COLOUR: Colour = (0.82, 0.83, 0.86, 1.0)
 JOINT_COLOUR: Colour = (0.25, 0.28, 0.33, 1.0)
@@ -75,9 +72,11 @@ def even_box(mass: float, inertia: Array, com: Array, body: int, colour: Colour)
         body: number of the body.
         colour: of the box.
     """
+    # second moments of an even box: m / 12 times its edges squared
     second = 0.5 * np.trace(inertia) * np.eye(3) - inertia
     moments, axes = np.linalg.eigh(second)
     edges = np.sqrt(12.0 * np.maximum(moments, 0.0) / mass)
+    # eigenvectors may be a left-handed frame
     if np.linalg.det(axes) < 0.0:
         axes[:, 0] *= -1.0
     size = tuple(np.maximum(edges, THINNEST).tolist())
@@ -119,7 +118,6 @@ def _tube(start: Array, end: Array, radius: float, body: int) -> Iterator[Visual
 
 
 def _turn_to(z: Array) -> Array:
-    """Return a rotation matrix with a unit vector as its third column."""
     x = np.cross(np.eye(3)[np.argmin(np.abs(z))], z)
     x /= np.linalg.norm(x)
     return np.column_stack((x, np.cross(z, x), z))
@@ -148,24 +146,21 @@ def plates_of(robot: Robot) -> tuple[Plate, ...]:
 
 
 def _plates(shape: Visual) -> Iterator[Plate]:
-    """Yield the plates of a shape that is not a mesh."""
+    def at(centre: Array) -> Array:
+        return shape.position + product(shape.rotation, centre)
+
     if shape.shape == "cylinder":
-        plates = _of_cylinder(*shape.size)
+        plates = _cylinder_plates(*shape.size)
     elif shape.shape == "sphere":
         edge = np.sqrt(2.0 * np.pi / 3.0) * shape.size[0]  # 6 edge^2 = 4 pi radius^2
-        plates = _of_box((edge, edge, edge))
+        plates = _box_plates((edge, edge, edge))
     else:
-        plates = _of_box(shape.size)
+        plates = _box_plates(shape.size)
     for plate in plates:
-        yield replace(
-            plate,
-            normal=product(shape.rotation, plate.normal),
-            centre=shape.position + product(shape.rotation, plate.centre),
-            body=shape.body,
-        )
+        yield moved(plate, shape.rotation, at, body=shape.body)
 
 
-def _of_box(edges: tuple[float, ...]) -> Iterator[Plate]:
+def _box_plates(edges: tuple[float, ...]) -> Iterator[Plate]:
     for axis, edge in enumerate(edges):
         area = edges[axis - 1] * edges[axis - 2]
         for side in (1.0, -1.0):
@@ -173,7 +168,7 @@ def _of_box(edges: tuple[float, ...]) -> Iterator[Plate]:
             yield Plate(area, normal, 0.5 * edge * normal)
 
 
-def _of_cylinder(radius: float, length: float) -> Iterator[Plate]:
+def _cylinder_plates(radius: float, length: float) -> Iterator[Plate]:
     for side in (1.0, -1.0):
         end = np.array([0.0, 0.0, side])
         yield Plate(np.pi * radius**2, end, 0.5 * length * end)

@@ -7,17 +7,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from space_robot_msgs_py.config.text import nearest
 from space_robot_msgs_py.config.validation import short
 
-from ..elementary.matrices import norm
+from ..elementary.matrices import Array, norm
 from .parts import JointFriction, JointLimits
 from .urdf_links import UrdfLink, read_name
 from .urdf_xml import Element, Fields, Report, UrdfFrame
-
-Array = NDArray[np.float64]
 
 KINDS = {
     "revolute": "revolute",
@@ -104,7 +101,6 @@ def _joint(element: Element, name: str, links: Mapping[str, UrdfLink], fields: F
 
 
 def _end(element: Element, tag: str, links: Mapping[str, UrdfLink], fields: Fields) -> str:
-    """Return the name of the link at one end of a joint."""
     end = fields.only(element, tag)
     name = end.attributes.get("link", "") if end is not None else ""
     if end is None or not name:
@@ -147,7 +143,7 @@ def _limits(
 
 
 def _range(element: Element, fields: Fields) -> tuple[float, float]:
-    """Return lower and upper limit; a missing one is 0, as defined by URDF."""
+    # a missing limit is 0, as defined by URDF
     lower, upper = (fields.limit(element, name) or 0.0 for name in ("lower", "upper"))
     interval = f"{lower:g} to {upper:g}"
     if lower > upper:
@@ -161,7 +157,6 @@ def _range(element: Element, fields: Fields) -> tuple[float, float]:
 
 
 def _most(element: Element, name: str, fields: Fields) -> float:
-    """Return the limit of velocity or effort."""
     limit = fields.limit(element, name)
     if limit is not None and limit > 0.0:
         return limit
@@ -172,7 +167,7 @@ def _most(element: Element, name: str, fields: Fields) -> float:
 
 
 def _friction(element: Element | None, fields: Fields) -> JointFriction | None:
-    """Return the friction in the file; 0 for a part that is missing in ``<dynamics>``."""
+    # a part missing in <dynamics> is 0, as defined by URDF; without the element both are unknown
     if element is None:
         return None
     fields.check_content(element, (), ("damping", "friction"))

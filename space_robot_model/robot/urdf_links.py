@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import os
+import os.path
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -11,16 +11,14 @@ from urllib.parse import unquote
 from xml.sax.saxutils import quoteattr, unescape
 
 import numpy as np
-from numpy.typing import NDArray
 
 from space_robot_msgs_py.config.validation import short
 from space_robot_msgs_py.errors import InputError
 
-from ..elementary.matrices import rotate_tensor
+from ..elementary.matrices import Array, rotate_tensor
+from .inertia import inertia_tensor
 from .parts import Colour, Visual
 from .urdf_xml import Element, Fields, Report, UrdfFrame, short_tag
-
-Array = NDArray[np.float64]
 
 ELEMENTS = ("inertial", "visual", "collision")
 EXTENSIONS = ("contact", "gravity", "self_collision_checking", "sensor", "verbose")
@@ -112,9 +110,7 @@ def _read_inertial(inertial: Element, link: UrdfLink) -> None:
             fields.repaired(inertia, f"<inertia> needs {product!r}", "", "read as 0")
     values = [fields.number(inertia, moment) for moment in MOMENTS[:3]]
     values += [fields.number(inertia, product, 0.0) for product in MOMENTS[3:]]
-    xx, yy, zz, xy, xz, yz = values
-    tensor = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-    link.inertia = rotate_tensor(frame.rotation, tensor)
+    link.inertia = rotate_tensor(frame.rotation, inertia_tensor(values))
     if link.mass < MASSLESS and link.inertia.any():
         trace = f"{np.trace(link.inertia):g} kg m2 (trace)"
         fields.repaired(inertia, "inertia without mass", trace, "the inertia is ignored")
@@ -228,7 +224,7 @@ def mesh_path(name: str, folder: Path) -> str:
     for scheme in PACKAGE:
         if name.startswith(scheme):
             package, _, rest = name.removeprefix(scheme).partition("/")
-            return next((str(p) for p in _places(package, rest, folder) if _is_file(p)), name)
+            return next((str(p) for p in _places(package, rest, folder) if os.path.isfile(p)), name)
     return name if "://" in name else str(folder / name)
 
 
@@ -242,7 +238,7 @@ def with_absolute_meshes(text: str, folder: Path) -> str:
 
     def absolute(match: re.Match[str]) -> str:
         path = mesh_path(unescape(match[2][1:-1]), folder)
-        return f"{match[1]}{quoteattr(path)}" if _is_file(path) else match[0]
+        return f"{match[1]}{quoteattr(path)}" if os.path.isfile(path) else match[0]
 
     return re.sub(r"""(<mesh\b[^>]*?\bfilename\s*=\s*)("[^"]*"|'[^']*')""", absolute, text)
 
@@ -261,10 +257,3 @@ def _places(package: str, rest: str, folder: Path) -> Iterator[Path]:
 
 def _paths(variable: str) -> list[Path]:
     return [Path(text) for text in os.environ.get(variable, "").split(os.pathsep) if text]
-
-
-def _is_file(path: str | Path) -> bool:
-    try:
-        return Path(path).is_file()
-    except (OSError, ValueError):  # invalid file name
-        return False

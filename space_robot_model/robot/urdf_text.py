@@ -18,19 +18,17 @@ from urllib.parse import quote
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..elementary.matrices import product
+from ..elementary.matrices import Array, product
 from ..elementary.rotations import rpy_of_rotation
 from .inertia import inertia_elements
-from .parts import Colour, JointLimits, Visual
+from .parts import Base, Body, Colour, Visual
 from .placements import distinct, frame_names, plain_name, urdf_joint_names
 from .robot import Robot
 from .shapes import shapes_of
 from .urdf_links import MOMENTS
 from .urdf_xml import LARGEST
 
-Array = NDArray[np.float64]
 Materials = dict[Colour, str]
 
 
@@ -52,12 +50,14 @@ def urdf_text(robot: Robot, name: str = "") -> str:
         SubElement(SubElement(root, "material", name=material), "color", rgba=_words(colour))
     joints = urdf_joint_names(robot)
     taken = {*joints, *frames.bodies, *frames.tools}
-    for body in (0, *(joint + 1 for joint in robot.order)):
-        if body:
+    tree, numbers = robot.tree, (0, *(joint + 1 for joint in robot.order))
+    parts: list[Base | Body] = [tree.base, *tree.links]
+    for body, part in zip(numbers, parts, strict=True):
+        if isinstance(part, Body):
             parent, child = frames.bodies[robot.parent[body - 1]], frames.bodies[body]
-            _add_joint(root, robot, body - 1, _Ends(joints[body - 1], parent, child))
+            _add_joint(root, part, _Ends(joints[body - 1], parent, child))
         link = SubElement(root, "link", name=frames.bodies[body])
-        _add_inertial(link, robot, body)
+        _add_inertial(link, part)
         for shape in shapes:
             if shape.body == body:
                 _add_visual(link, shape, materials)
@@ -85,38 +85,33 @@ def _joint(root: Element, ends: _Ends, kind: str, rotation: Array, position: Arr
     return joint
 
 
-def _add_joint(root: Element, robot: Robot, joint: int, ends: _Ends) -> None:
-    is_actuated, turn = joint < robot.n, robot.rotation[joint]
-    limits = robot.limits[joint] if is_actuated else JointLimits()
-    kind = _kind(limits, bool(robot.is_prismatic[joint]))
-    element = _joint(root, ends, kind, turn, product(turn, robot.offset[joint]))
+def _add_joint(root: Element, link: Body, ends: _Ends) -> None:
+    limits, kind = link.limits, _kind(link)
+    element = _joint(root, ends, kind, link.rotation, product(link.rotation, link.offset))
     SubElement(element, "axis", xyz="0 0 1")
     numbers = limits._asdict()
     if kind == "continuous":
         numbers = {"velocity": limits.velocity, "effort": limits.effort}
     if kind != "continuous" or any(map(math.isfinite, numbers.values())):
         SubElement(element, "limit", {key: _bound(value) for key, value in numbers.items()})
-    coulomb, viscous = robot.friction[joint]
-    if is_actuated and math.isfinite(coulomb):
-        SubElement(element, "dynamics", damping=_word(viscous), friction=_word(coulomb))
-    elif not is_actuated:
-        damping = robot.springs[joint - robot.n].damping
-        friction = coulomb if math.isfinite(coulomb) else 0.0
-        SubElement(element, "dynamics", damping=_word(damping), friction=_word(friction))
+    if link.friction or link.passive:
+        coulomb, viscous = link.friction or (0.0, 0.0)
+        damping = link.passive.damping if link.passive else viscous
+        SubElement(element, "dynamics", damping=_word(damping), friction=_word(coulomb))
 
 
-def _kind(limits: JointLimits, is_prismatic: bool) -> str:
-    if is_prismatic:
+def _kind(link: Body) -> str:
+    if link.joint == "prismatic":
         return "prismatic"
-    is_limited = math.isfinite(limits.lower) or math.isfinite(limits.upper)
+    is_limited = math.isfinite(link.limits.lower) or math.isfinite(link.limits.upper)
     return "revolute" if is_limited else "continuous"
 
 
-def _add_inertial(link: Element, robot: Robot, body: int) -> None:
+def _add_inertial(link: Element, part: Base | Body) -> None:
     inertial = SubElement(link, "inertial")
-    _add_origin(inertial, np.eye(3), robot.com[body])
-    SubElement(inertial, "mass", value=_word(robot.mass[body]))
-    elements = map(_word, inertia_elements(robot.inertia[body]))
+    _add_origin(inertial, np.eye(3), part.com)
+    SubElement(inertial, "mass", value=_word(part.mass))
+    elements = map(_word, inertia_elements(part.inertia))
     SubElement(inertial, "inertia", dict(zip(MOMENTS, elements, strict=True)))
 
 
@@ -145,7 +140,7 @@ def _add_origin(element: Element, rotation: Array, position: Array) -> None:
 
 
 def _bound(limit: float) -> str:
-    """Return a limit as text; infinity as the number that `urdf_xml` reads as infinite."""
+    # other readers of URDF do not accept inf; `urdf_xml` reads this number as infinite
     return _word(limit if math.isfinite(limit) else math.copysign(LARGEST, limit))
 
 

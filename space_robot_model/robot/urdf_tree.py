@@ -8,18 +8,16 @@ from dataclasses import dataclass, replace
 from typing import Literal, cast
 
 import numpy as np
-from numpy.typing import NDArray
 
 from space_robot_msgs_py.config.validation import one_of, short
 
-from ..elementary.matrices import product, rotate_tensor
+from ..elementary.matrices import Array, product, rotate_tensor
 from .inertia import inertia_defect, nearest_inertia
-from .parts import Base, Body, RobotTree, Tool, Visual
+from .parts import Base, Body, RobotTree, Tool, Visual, moved
 from .urdf_joints import UrdfJoint
 from .urdf_links import MASSLESS, UrdfLink
 from .urdf_xml import IDENTITY, UrdfFrame
 
-Array = NDArray[np.float64]
 Kind = Literal["revolute", "prismatic", "fixed"]
 
 MOUNT = "`space-robot new --on` mounts an arm on a satellite"
@@ -90,6 +88,7 @@ def build_tree(
     while waiting:
         name = waiting.pop()
         tree.order.append(name)
+        # the stack gives the last one first
         for other, edge in reversed(neighbours[name]):
             if name == tree.base or edge.joint is not tree.edges[name].joint:
                 tree.edges[other] = edge
@@ -140,6 +139,7 @@ def mend_massless(links: Mapping[str, UrdfLink], tree: Tree) -> None:
     Raises:
         InputError: a massless body carries others, so its motion is undefined.
     """
+    # locking a joint merges two bodies, which may be massless still
     while True:
         carriers = tree.carriers()
         mass = dict.fromkeys(carriers.values(), 0.0)
@@ -207,6 +207,7 @@ def mend_inertias(links: Mapping[str, UrdfLink], tree: Tree) -> None:
         defect, moments = inertia_defect(link.mass, link.inertia)
         if not defect:
             continue
+        # zero has nothing near it but a point
         nearest = nearest_inertia(link.inertia) if "zero" not in defect else None
         repair = "raised to the nearest physical one"
         if nearest is None or inertia_defect(link.mass, nearest)[0]:
@@ -241,7 +242,6 @@ def solid_inertia(mass: float, visuals: tuple[Visual, ...]) -> tuple[Array, str]
 
 
 def _solid(mass: float, shape: str, size: tuple[float, ...]) -> list[float]:
-    """Return the principal moments of a homogeneous solid, kg m2, in its axes."""
     if shape == "sphere":
         return [0.4 * mass * size[0] * size[0]] * 3
     if shape == "cylinder":
@@ -266,14 +266,15 @@ def make_tree(
     frames, root = moved_frames(tree), links[tree.base]
     base = Base(root.mass, *_matter(root, IDENTITY), root.name)
     own = [_link(links[child], edge, frames) for child, edge in tree.edges.items()]
-    visuals = [
-        visual
-        for child in (tree.base, *tree.edges)
-        for visual in _visuals(links[child], frames.get(child, IDENTITY))
-    ]
-    return RobotTree(
-        name, base, own, tools=[_tool(tool, frames) for tool in tools], visuals=visuals
-    )
+    visuals, ends = [], []
+    for child in (tree.base, *tree.edges):
+        frame = frames.get(child, IDENTITY)
+        for visual in links[child].visuals:
+            visuals.append(moved(visual, frame.rotation.T, frame.inside, link=child))
+    for tool in tools:
+        frame = frames.get(tool, IDENTITY)
+        ends.append(Tool(tool, frame.rotation.T, frame.inside(np.zeros(3)), link=tool))
+    return RobotTree(name, base, own, tools=ends, visuals=visuals)
 
 
 def moved_frames(tree: Tree) -> dict[str, UrdfFrame]:
@@ -306,9 +307,9 @@ def end_frames(links: Mapping[str, UrdfLink], tree: Tree) -> list[str]:
 
 
 def _link(link: UrdfLink, edge: Edge, frames: Mapping[str, UrdfFrame]) -> Body:
-    """Return a link with its joint, in the frame of its body."""
     joint, parent = edge.joint, frames.get(edge.parent, IDENTITY)
     rotation = parent.rotation.T
+    # seen from the child: the joint turns the other way, about an axis through the parent's frame
     if edge.is_reversed:
         offset, axis = -parent.position, -joint.axis
     else:
@@ -333,26 +334,4 @@ def _link(link: UrdfLink, edge: Edge, frames: Mapping[str, UrdfFrame]) -> Body:
 
 
 def _matter(link: UrdfLink, frame: UrdfFrame) -> tuple[Array, Array]:
-    """Return inertia and centre of mass in a frame that is relative to the link's."""
-    turn = frame.rotation.T
-    return rotate_tensor(turn, link.inertia), product(turn, link.com - frame.position)
-
-
-def _visuals(link: UrdfLink, frame: UrdfFrame) -> list[Visual]:
-    turn, at = frame.rotation.T, frame.position
-    return [
-        replace(
-            visual,
-            rotation=product(turn, visual.rotation),
-            position=product(turn, visual.position - at),
-            link=link.name,
-        )
-        for visual in link.visuals
-    ]
-
-
-def _tool(name: str, frames: Mapping[str, UrdfFrame]) -> Tool:
-    """Return the frame of a link as a tool."""
-    frame = frames.get(name, IDENTITY)
-    turn = frame.rotation.T
-    return Tool(name, turn, -product(turn, frame.position), link=name)
+    return rotate_tensor(frame.rotation.T, link.inertia), frame.inside(link.com)

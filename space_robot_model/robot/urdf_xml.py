@@ -5,19 +5,17 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Collection, Iterator
-from dataclasses import asdict, dataclass, field
-from typing import Any, NamedTuple
+from dataclasses import dataclass, field
+from typing import NamedTuple
 from xml.parsers import expat
 
 import numpy as np
-from numpy.typing import NDArray
 
 from space_robot_msgs_py.config.validation import short
 from space_robot_msgs_py.errors import InputError
 
+from ..elementary.matrices import Array, product
 from ..elementary.rotations import rotation_of_rpy
-
-Array = NDArray[np.float64]
 
 DEEPEST = 100
 """Maximum depth of nested elements."""
@@ -109,11 +107,6 @@ class Finding:
         """Return defect and repair in one line."""
         return f"line {self.line}: {self._named()}: {self.repair}"
 
-    @property
-    def told(self) -> dict[str, Any]:
-        """Return the finding as a mapping."""
-        return asdict(self)
-
     def _named(self) -> str:
         return f"{self.part}: {self.defect}{f', got {self.value}' if self.value else ''}"
 
@@ -162,6 +155,10 @@ class UrdfFrame(NamedTuple):
     """(3, 3) its axes, as columns, in the axes of the other."""
     position: Array
     """(3,) position, m, in the axes of the other."""
+
+    def inside(self, point: Array) -> Array:
+        """Return a point (3,) of the other frame in this one, m."""
+        return product(self.rotation.T, point - self.position)
 
 
 IDENTITY = UrdfFrame(np.eye(3), np.zeros(3))

@@ -42,8 +42,6 @@ class _Open(BaseModel):
 
 
 class _Names(_Open):
-    """The names of what is flown; a node's other settings are for the node's own schema."""
-
     robot: Text = ""
     mission: Text = ""
     case: Text = ""
@@ -75,11 +73,7 @@ class _Description(_Names):
 
 
 def read_description(noted: Mapping[str, str]) -> dict[str, Any]:
-    """Read what was flown from a bag's ``custom_data``; empty for a bag of another recorder.
-
-    Raises:
-        InputError: the description is invalid; one line that names the key.
-    """
+    """Read what was flown from a bag's ``custom_data``; empty for a bag of another recorder."""
     if (text := noted.get(FLIGHT_KEY)) is None:
         return {}
     try:
@@ -95,7 +89,7 @@ def read_description(noted: Mapping[str, str]) -> dict[str, Any]:
 
 
 def _unwritable(value: Any, key: str, depth: int) -> Iterator[str]:
-    """Return the first value that cannot be written as JSON, at any key."""
+    # JSON has no infinity, and deep nesting exhausts the stack of who writes it again
     if depth == 0:
         yield f"{key[:80]}: nested too deeply"
     elif isinstance(value, (dict, list)):

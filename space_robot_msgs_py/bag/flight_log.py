@@ -9,11 +9,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from .. import topics
 from ..compiled.records import Block
 from ..samples import (
     ALL_FIELDS,
     ORBIT_FIELDS,
     PASSIVE_FIELDS,
+    SIGNALS,
     STATE_FIELDS,
     LawInForce,
     MeasuredSignals,
@@ -32,7 +34,14 @@ BLOCK_TICKS = 60_000
 """Rows of a block but the last: 30 s at 2 kHz, the paper's whole mission."""
 REFERENCE = ("reference_joints", "reference_base")
 """The columns the desired motion fills."""
-MEASURED_COLUMNS = (*STATE_FIELDS, *PASSIVE_FIELDS, "magnetic_field")
+MEASURED_APART = {
+    name: field.topic
+    for name in ORBIT_FIELDS
+    for field in SIGNALS[name].fields
+    if field.topic in topics.STATES
+}
+"""Topic of each signal of an orbit that a sensor measures."""
+MEASURED_COLUMNS = (*STATE_FIELDS, *PASSIVE_FIELDS, *MEASURED_APART)
 """Columns that `FlightLog` and `MeasuredStates` have in common."""
 
 
@@ -59,7 +68,7 @@ class MeasuredStates(MeasuredSignals):
         cls, log: FlightLog, new: Callable[[tuple[int, ...]], Array] = of_nan
     ) -> MeasuredStates:
         """Return columns of NaN, as many rows as ``log`` has; ``new`` as in `allocate`."""
-        return cls.of(log).each(lambda _, column: new(column.shape))
+        return cls(*(new(getattr(log, name).shape) for name in MEASURED_COLUMNS))
 
     @property
     def angular_velocity(self) -> Array:
@@ -70,10 +79,6 @@ class MeasuredStates(MeasuredSignals):
     def columns(self) -> dict[str, Array]:
         """All of them, by name."""
         return {name: getattr(self, name) for name in MEASURED_COLUMNS}
-
-    def each(self, change: Callable[[str, Array], Array]) -> MeasuredStates:
-        """Return what ``change`` makes of each column, given its name."""
-        return MeasuredStates(*(change(name, column) for name, column in self.columns.items()))
 
 
 @dataclass(eq=False, repr=False, kw_only=True)
@@ -269,12 +274,16 @@ class FlightLog(StateSignals):
         self.actuator_commands[rows] = torques[:, self.axes :]
 
     def record_measured(
-        self, new: Callable[[tuple[int, ...]], Array] = of_nan, has_magnetometer: bool = False
+        self, new: Callable[[tuple[int, ...]], Array] = of_nan, names: RobotNames | None = None
     ) -> None:
-        """Allocate columns of NaN for measured states and the law's error."""
+        """Allocate columns of NaN for measured states and the law's error.
+
+        ``names``: of what the robot has (None: none of the sensors `MEASURED_APART`).
+        """
         self.measured = MeasuredStates.unknown(self, new)
-        if not has_magnetometer:
-            self.measured.magnetic_field = np.empty((self.ticks, 0))
+        for name, topic in MEASURED_APART.items():
+            if not (names and getattr(names, topic.of)):
+                setattr(self.measured, name, np.empty((self.ticks, 0)))
         self.assumed_error = new(self.applied_torque.shape)
         self.assumed_error[:] = np.nan
 
@@ -283,8 +292,9 @@ class FlightLog(StateSignals):
         if self.measured is None:
             return self
         columns: dict[str, Any] = self.measured.columns
-        if not self.measured.magnetic_field.size:
-            del columns["magnetic_field"]
+        for name in MEASURED_APART:
+            if not columns[name].size:
+                del columns[name]
         return replace(self, **columns, measured=None, assumed_error=None)
 
     def state(self, tick: int) -> RobotState:
@@ -315,10 +325,8 @@ class FlightLog(StateSignals):
 
     def rows(self, start: int, stop: int) -> FlightLog:
         """The rows ``start`` to ``stop``: views, not copies. Counts stay those of the whole log."""
-        rows: dict[str, Any] = {name: column[start:stop] for name, column in self.columns.items()}
-        if self.measured is not None:
-            rows["measured"] = self.measured.each(lambda _, column: column[start:stop])
-        return replace(self, **rows, first_tick=self.first_tick + start)
+        rows = _with_columns(self, lambda column: column[start:stop])
+        return replace(rows, first_tick=self.first_tick + start)
 
 
 def finite_rows(columns: Iterable[Array]) -> NDArray[np.bool_]:
@@ -326,6 +334,13 @@ def finite_rows(columns: Iterable[Array]) -> NDArray[np.bool_]:
     each = (np.isfinite(column.reshape(len(column), -1)).all(axis=1) for column in columns)
     finite_rows: NDArray[np.bool_] = np.logical_and.reduce(list(each))
     return finite_rows
+
+
+def _with_columns(log: FlightLog, change: Callable[[Array], Array]) -> FlightLog:
+    columns: dict[str, Any] = {name: change(column) for name, column in log.columns.items()}
+    if log.measured is not None:
+        columns["measured"] = MeasuredStates(*map(change, log.measured.columns.values()))
+    return replace(log, **columns)
 
 
 def _beside(joints: Array, passive: Array) -> Array:

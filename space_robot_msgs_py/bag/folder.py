@@ -6,16 +6,14 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from itertools import islice
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 from mcap.writer import MCAP0_MAGIC
-from pydantic import BaseModel, Field, ValidationError
+from pydantic import BaseModel, Field
 
 from ..config.text import MOST_COMPARED, MOST_NEAR, nearest, printable
 from ..config.validation import read_yaml, validate
-from ..config.yaml_text import parse_yaml
 from ..errors import InputError
-from ..topics import Topic
 from .batch import Batch
 from .mcap_storage import McapStorage
 from .writer import DESCRIPTION, METADATA
@@ -55,57 +53,14 @@ class BagInformation(BaseModel):
         """Number of messages per topic."""
         return {t.topic_metadata.name: t.message_count for t in self.topics_with_message_count}
 
-    @property
-    def compressed(self) -> bool:
-        """True if rosbag2 itself compressed files or messages, rather than MCAP its chunks."""
-        return self.compression_mode.lower() in ("file", "message")
-
 
 def read_information(path: Path) -> BagInformation:
-    """Read the metadata in a bag's folder.
-
-    Raises:
-        InputError: there is none, or it is no rosbag2 metadata.
-    """
+    """Read the metadata in a bag's folder."""
     file = path / METADATA
     content = read_yaml(file).get("rosbag2_bagfile_information")
     if not isinstance(content, dict):
         raise InputError(f"{file}: not the metadata of a rosbag2 bag")
     return validate(BagInformation, content, str(file))
-
-
-def _information_in(file: Storage) -> BagInformation | None:
-    """Return the copy of the metadata in an MCAP file; None if there is none."""
-    try:
-        text = file.metadata.get("rosbag2", {}).get("serialized_metadata", "")
-        return BagInformation.model_validate(parse_yaml(text))
-    except (InputError, ValidationError):
-        return None
-
-
-class Storage(Protocol):
-    """A file with messages, or a whole folder that rosbag2 compressed."""
-
-    counts: Counter[str] | None
-    """Messages per topic, from the file itself; None: not recorded."""
-    metadata: dict[str, dict[str, str]]
-    """The metadata records in it, by name."""
-    has_end: bool
-    """True if its writer closed it, as far as it is known."""
-
-    def topics(self) -> dict[str, str]:
-        """Return the type by topic."""
-
-    def batches(self) -> Iterator[Batch]:
-        """Yield all messages."""
-
-    @property
-    def incomplete(self) -> bool:
-        """True if something could not be read; known after `batches`."""
-
-    @property
-    def damage(self) -> list[str]:
-        """Damage, one sentence each; complete after `batches`."""
 
 
 class Bag:
@@ -125,8 +80,8 @@ class Bag:
             files: in the order of their writing.
             information: metadata.yaml's (None: there is none that can be read).
             damage: what is wrong with the folder, a sentence each.
-            closed: nothing but the files can say that the bag is unfinished.
-            lacks_files: some that metadata.yaml names are not there.
+            closed: False if the bag is unfinished for lack of a metadata.yaml.
+            lacks_files: True if files that metadata.yaml names are missing.
         """
         self._files, self._damage = files, damage
         self.finished = closed and all(file.has_end for file in files)
@@ -154,12 +109,11 @@ class Bag:
     def custom_data(self) -> dict[str, str]:
         """Return the custom data of this project's recorder; empty for other recorders.
 
-        From metadata.yaml, its copy in the file, or what was noted when recording began.
+        From metadata.yaml, or what was noted when recording began and ended.
         """
-        for information in (self._information, *map(_information_in, self._files[::-1])):
-            if information and information.custom_data:
-                return information.noted
-        return next((m for f in self._files if (m := f.metadata.get(DESCRIPTION))), {})
+        if self._information and self._information.custom_data:
+            return self._information.noted
+        return next((m for f in self._files[::-1] if (m := f.metadata.get(DESCRIPTION))), {})
 
     @property
     def incomplete(self) -> bool:
@@ -178,13 +132,6 @@ class Bag:
             counts[batch.topic] += len(batch)
         return counts
 
-    def messages(self, *wanted: Topic) -> Iterator[tuple[str, bytes]]:
-        """Yield topic name and bytes of messages of some topics, in order for each topic."""
-        names = {topic.full_name for topic in wanted}
-        for batch in self.batches():
-            if batch.topic in names:
-                yield from ((batch.topic, batch.message(i)) for i in range(len(batch)))
-
 
 def some_of(names: Sequence[str]) -> str:
     """Return the first of some names, and how many there are more; a bag may have thousands."""
@@ -194,18 +141,15 @@ def some_of(names: Sequence[str]) -> str:
 
 
 class RosbagsStorage:
-    """A db3 file, or the folder of a bag that rosbag2 compressed."""
+    """A db3 file, or the folder of a bag that rosbag2 compressed; has what `McapStorage` has."""
 
     def __init__(self, path: Path) -> None:
-        """Look at it.
-
-        Raises:
-            InputError: it cannot be read.
-        """
-        self._path, self._fault = path, ""
+        """Read the topics."""
+        self._path = path
         self.counts: Counter[str] | None = None
         self.metadata: dict[str, dict[str, str]] = {}
-        self.has_end = True
+        self.damage: list[str] = []
+        self.has_end, self.incomplete = True, False
         try:
             with _reader(path) as reader:
                 self._types = {str(c.topic): str(c.msgtype) for c in reader.connections}
@@ -216,19 +160,9 @@ class RosbagsStorage:
         """Return the type by topic."""
         return self._types
 
-    @property
-    def incomplete(self) -> bool:
-        """True if the messages could not be read to their end."""
-        return bool(self._fault)
-
-    @property
-    def damage(self) -> list[str]:
-        """The sentence that says so."""
-        return [self._fault] if self._fault else []
-
     def batches(self) -> Iterator[Batch]:
         """Yield all messages by log time; they end where they can no longer be read."""
-        self._fault = ""
+        self.damage, self.incomplete = [], False
         waiting: dict[str, list[tuple[int, bytes]]] = {name: [] for name in self._types}
         try:
             with _reader(self._path) as reader:
@@ -239,10 +173,14 @@ class RosbagsStorage:
                         yield Batch.of(name, self._types[name], waiting[name])
                         waiting[name] = []
         except Exception as error:  # likewise
-            self._fault = f"{self._path.name}: cannot be read to its end ({_line(error)})"
+            self.damage = [f"{self._path.name}: cannot be read to its end ({_line(error)})"]
+            self.incomplete = True
         for name, messages in waiting.items():
             if messages:
                 yield Batch.of(name, self._types[name], messages)
+
+
+Storage = McapStorage | RosbagsStorage
 
 
 def _reader(path: Path) -> Reader:
@@ -274,12 +212,13 @@ def open_bag(path: Path) -> Bag:
             information = read_information(path)
         except InputError as error:
             damage = [str(error)]
-    if information and information.compressed:
+    # by rosbag2 itself, rather than chunks by MCAP
+    if information and information.compression_mode.lower() in ("file", "message"):
         for name in information.relative_file_paths:
             _check_regular(path / Path(name).name)
         return Bag([RosbagsStorage(path)], information, [], closed)
     files = [file for suffix in _STORAGES for file in path.glob(f"*{suffix}")]
-    files.sort(key=lambda file: (len(file.name), file.name))
+    files.sort(key=lambda file: (len(file.name), file.name))  # _10 behind _9
     if information:
         files = _listed(path, information, files, damage)
     if not files and damage:
@@ -291,7 +230,6 @@ def open_bag(path: Path) -> Bag:
 
 
 def _suggestion(folder: Path, name: str = "") -> str:
-    """Return the bags in a folder as a suggestion: those with a similar name, or any of them."""
     try:
         entries = sorted(islice(folder.iterdir(), MOST_COMPARED))
         bags = {file.name: file for file in entries if (file / METADATA).is_file()}
@@ -305,7 +243,6 @@ def _suggestion(folder: Path, name: str = "") -> str:
 def _listed(
     path: Path, information: BagInformation, existing: list[Path], damage: list[str]
 ) -> list[Path]:
-    """Return the existing files that metadata.yaml names, in its order."""
     names = [Path(name).name for name in information.relative_file_paths]
     files = [path / name for name in names if (path / name).exists()]
     missing = [name for name in names if not (path / name).exists()]

@@ -10,7 +10,7 @@ import numpy as np
 from ..samples import LawInForce, Timebase
 from .flight_log import FlightLog
 
-MOST_TOLD = 3
+MOST_LISTED = 3
 """Largest number of changes listed one by one in a short text."""
 
 
@@ -33,6 +33,7 @@ class LawChange(NamedTuple):
 
 def same(one: LawInForce, other: LawInForce) -> bool:
     """Return True if two laws are the same with the same gains, to the last bit."""
+    # compared as integers, NaN is itself, and -0.0 is not 0.0
     return (
         one.name == other.name
         and one.gains.keys() == other.gains.keys()
@@ -75,7 +76,7 @@ def in_words(laws: Sequence[dict[str, Any]]) -> str:
     if not laws:
         return ""
     words, flown = str(laws[0]["controller"]), [laws[0]]
-    for law in laws[1 : 1 + MOST_TOLD]:
+    for law in laws[1 : 1 + MOST_LISTED]:
         last_of_name = [known for known in flown if known["controller"] == law["controller"]][-1:]
         others = [
             k
@@ -91,5 +92,5 @@ def in_words(laws: Sequence[dict[str, Any]]) -> str:
         else:
             words += f" (begun again {when})"
         flown.append(law)
-    left = len(laws) - 1 - MOST_TOLD
+    left = len(laws) - 1 - MOST_LISTED
     return words + (f" and {left} more" if left > 0 else "")

@@ -124,7 +124,7 @@ class MessageAccounting:
         return np.ones(len(ticks), np.bool_)
 
     def _pass_over(self, tick: int, step: int) -> None:
-        """The next message is ``tick``: those between may still come, late, but for a pause."""
+        # those between may still come, late, unless they were sent during a pause
         if self._is_resuming:
             self._is_resuming = False
             self._left_out += tick - max(0, self.last)
@@ -142,12 +142,12 @@ class MessageAccounting:
 
     @property
     def gaps(self) -> int:
-        """Places up to its own last message that none is of, for a topic that begins at tick 0."""
+        """Number of missing messages before the last received one, if the first is of tick 0."""
         places = (self.last - self._left_out) // (self.unit or 1) + 1 + self._pauses
         return max(0, places - self.received)
 
     def pause(self) -> None:
-        """The next message may be of any later tick; those between are left out on purpose."""
+        """Accept any later tick as the next one: messages before it are excluded on purpose."""
         self._guard = StampGuard(LONGEST_JUMP)
         self._is_resuming = True
 

@@ -40,9 +40,9 @@ from .selection import REQUIRED, Selection
 
 DEFAULT_PERIOD = 0.0005
 """Period of a bag without a description, s."""
-_STAMPS_LOOKED_AT = 200
+_STAMPS_READ = 200
 _STRETCHES = 3
-"""Stretches without a whole tick that are told."""
+"""Maximum number of listed stretches without a whole tick."""
 
 
 def read_flight(
@@ -178,11 +178,7 @@ def missing_ticks(whole: NDArray[np.bool_], timebase: Timebase) -> list[str]:
 
 
 def first_states(bag: Bag, selection: Selection) -> tuple[RobotNames, list[int]]:
-    """Return the names of the joints, and the first stamps in ns.
-
-    Raises:
-        InputError: there is none, or none that can be read.
-    """
+    """Return the names of the joints, and the first stamps in ns."""
     names: tuple[str, ...] = ()
     moved: tuple[str, ...] = ()
     """The joints of the first reference that names no others; the rest have no motor."""
@@ -195,7 +191,7 @@ def first_states(bag: Bag, selection: Selection) -> tuple[RobotNames, list[int]]
         elif topic is topics.REFERENCE_JOINTS and not moved:
             referenced += dict.fromkeys(_joint_names(topic, batch))
         moved = next((known for known in referenced if known and set(known) <= set(names)), ())
-        if len(stamps) >= _STAMPS_LOOKED_AT and moved:
+        if len(stamps) >= _STAMPS_READ and moved:
             break
     if not names:
         raise missing(topics.JOINT_STATES, bag, selection)
@@ -206,7 +202,6 @@ def first_states(bag: Bag, selection: Selection) -> tuple[RobotNames, list[int]]
 
 
 def _empty_rows(bag: Bag, selection: Selection, flight: dict[str, Any], damage: list[str]) -> Rows:
-    """Return rows for the joints and the period of the bag's first states."""
     names, stamps = first_states(bag, selection)
     timebase, doubt = timebase_of(stamps, flight)
     damage += doubt
@@ -216,7 +211,6 @@ def _empty_rows(bag: Bag, selection: Selection, flight: dict[str, Any], damage: 
 
 
 def _joint_names(topic: topics.Topic, batch: Batch) -> Iterator[tuple[str, ...]]:
-    """Yield the joints in each message of a batch that can be read."""
     for i in range(len(batch)):
         with suppress(MessageError):
             message = decode(batch.message(i), topic.type)
@@ -226,9 +220,9 @@ def _joint_names(topic: topics.Topic, batch: Batch) -> Iterator[tuple[str, ...]]
 def timebase_of(
     first_stamps: Sequence[int], flight: Mapping[str, Any]
 ) -> tuple[Timebase, list[str]]:
-    """Return the period of the flight: as described, if the stamps (ns) are not against it.
+    """Return the timebase of a flight, and a warning if the stamps (ns) contradict its description.
 
-    With it what is wrong with the description's.
+    The described period is taken unless they do.
     """
     described = flight.get("period")
     steps = np.diff(np.array(first_stamps, np.int64))

@@ -100,9 +100,6 @@ class BagRecorder:
 
         A file of the bag that has ``split_size`` bytes is followed by another (0: never).
         ``names``: full name of each topic, by its own; None: that in the ``namespace``.
-
-        Raises:
-            InputError: the bag exists already, or cannot be written.
         """
         self._flight, self._excused = dict(flight), topics_with_allowed_gaps(flight)
         own = {topic.name: topic.in_namespace(namespace) for topic in topics.RECORDED}
@@ -136,13 +133,8 @@ class BagRecorder:
     def record(self, topic: topics.Topic, data: bytes, sent_ns: int = 0, sequence: int = 0) -> None:
         """Add one serialized message.
 
-        One whose stamp cannot be right is kept at the time of the last good one.
-
-        Args:
-            topic: it came on.
-            data: the message.
-            sent_ns: when, by the sender's clock (0: not known).
-            sequence: its place among all of its publisher, from 1 on (0: not known).
+        ``sent_ns``: when, by the sender's clock; ``sequence``: the publisher's number of it, from 1
+        on; 0: not known.
         """
         name = topic.full_name
         self._sequences[name].take(sequence)
@@ -156,6 +148,7 @@ class BagRecorder:
             counted.invalid_stamps += 1
         if not is_new or self.failure:
             return
+        # one whose stamp cannot be right is kept at the time of the last good one
         log_ns = self._timebase.stamp_ns(max(0, min(tick, counted.last)))
         try:
             self._writer.write(self._written[topic.name], log_ns, sent_ns or log_ns, tick, data)
@@ -166,11 +159,7 @@ class BagRecorder:
                 self.flush()
 
     def describe(self, flown: Any) -> None:
-        """Add to the flight's description what the plant says, where nobody has said more.
-
-        Args:
-            flown: the plant's description; no mapping: it is ignored.
-        """
+        """Add the plant's description, a mapping, unless the flight's has the robot already."""
         if not isinstance(flown, dict) or ROBOT_KEY in self._flight:
             return
         self._flight = flown | self._flight
@@ -182,12 +171,7 @@ class BagRecorder:
                 self._fail(error)
 
     def note_sent(self, topic_name: str, count: int) -> None:
-        """Record how many messages a node reports to have sent on a topic.
-
-        Args:
-            topic_name: the topic; others than those recorded are ignored.
-            count: messages.
-        """
+        """Take the number of messages that a node reports to have sent on a recorded topic."""
         if sequences := self._sequences.get(topic_name):
             sequences.note_sent(count)
 

@@ -24,10 +24,10 @@ from ..samples import (
 )
 from ..signals import Each, carried_by
 from ..wire.definitions import decode
-from ..wire.messages import TELEMETRY_ROWS, SampleColumn, describe
+from ..wire.messages import TELEMETRY_ROWS, describe
 from ..wire.telemetry import LawCodec
 from .batch import NO_STAMP, Array, Batch, FieldReader, Integers, Places
-from .flight_log import FlightLog, MeasuredStates
+from .flight_log import MEASURED_APART, FlightLog, MeasuredStates
 from .message_accounting import LONGEST_JUMP, MessageAccounting
 
 _GROWTH = 1.25
@@ -46,13 +46,7 @@ class Rows:
     """Takes batches in their order; the log grows with its ticks."""
 
     def __init__(self, names: RobotNames, timebase: Timebase, origin_ns: int) -> None:
-        """Begin with no tick.
-
-        Args:
-            names: of the joints, in the order of the columns.
-            timebase: of the stamps.
-            origin_ns: stamp of tick 0.
-        """
+        """Begin with no tick; ``origin_ns`` is the stamp of tick 0."""
         self.log = FlightLog.allocate(0, names, timebase)
         self.log.commanded_torque = np.empty((0, len(names.axes)))
         self.accounting: dict[str, MessageAccounting] = {}
@@ -73,8 +67,8 @@ class Rows:
         self._unnamed = set(NAMING)
         self._true: MeasuredStates | None = None
         """True states, once one has arrived; after `split_truth` the measured states."""
-        self._magnetometer = SimpleNamespace(magnetic_field=np.empty((0, 0)))
-        """The field as measured; the true one is in the log."""
+        self._apart = SimpleNamespace(**{name: np.empty((0, 0)) for name in MEASURED_APART})
+        """What sensors with a topic of their own measured; the true columns are in the log."""
         self._errors: list[tuple[Integers, Array]] = []
         """Ticks and e of the telemetry."""
         self._laws: list[LawInForce] = []
@@ -115,8 +109,12 @@ class Rows:
         reader = self._readers.get(topic)
         if not reader or not reader.description.columns:
             return
-        is_field = topic is topics.MAGNETOMETER
-        self._widen(self._magnetometer if is_field else self.log, reader.description.columns)
+        target = self._apart if topic in MEASURED_APART.values() else self.log
+        for name, first, length in reader.description.columns:
+            column = getattr(target, name)
+            # the first message of wheels, gears or an orbit shows that the robot has them
+            if column.ndim == 2 and column.shape[1] < first + length:
+                setattr(target, name, np.full((self._rows, first + length), np.nan))
         if topic.per_tick:
             near = ticks < self._rows
             if not near.all():
@@ -129,7 +127,6 @@ class Rows:
                 self._is_wall_clock |= bool(np.any(sent_ns != batch.log_ns[which]))
 
     def _learn_names(self, topic: topics.Topic, batch: Batch) -> None:
-        """Take the names of actuators and gears from the first message with some, if it has any."""
         log, axes = self.log, self._names.axes
         for i in range(len(batch)):
             try:
@@ -157,13 +154,6 @@ class Rows:
         robot = self._names._replace(**named)
         self._readers[topic] = FieldReader(describe(topic, robot, log.timebase))
 
-    def _widen(self, target: Any, columns: tuple[SampleColumn, ...]) -> None:
-        """Make room for what some robots have only: columns that are not as wide yet."""
-        for name, first, length in columns:
-            column = getattr(target, name)
-            if column.ndim == 2 and column.shape[1] < first + length:
-                setattr(target, name, np.full((self._rows, first + length), np.nan))
-
     def split_truth(self) -> None:
         """Make the true states those of the log, if both their halves came; call it at the end."""
         if not all(self.counts[topic.full_name] for topic in topics.TRUTH):
@@ -171,7 +161,8 @@ class Rows:
         if self._true is None:
             return
         measured = MeasuredStates.of(self.log)
-        measured.magnetic_field = self._magnetometer.magnetic_field
+        for name, column in vars(self._apart).items():
+            setattr(measured, name, column)
         for name in STATE_FIELDS + PASSIVE_FIELDS:
             setattr(self.log, name, getattr(self._true, name))
         self.log.measured = self._true = measured
@@ -196,7 +187,6 @@ class Rows:
         return log
 
     def _ticks(self, topic: topics.Topic, batch: Batch) -> tuple[Integers, NDArray[np.bool_]]:
-        """Return (M,) ticks, and whether a message has one."""
         if not topic.has_stamp:
             numbers, known = np.zeros(len(batch)), np.zeros(len(batch), np.bool_)
             for which, values in self._readers[topic].read(batch):
@@ -219,7 +209,7 @@ class Rows:
             self._believed += length * len(ticks)
             self._grow(int(ticks.max()) + length)
         places, rows = _by_place(ticks, rows, self._rows)
-        target: Any = self._magnetometer if topic is topics.MAGNETOMETER else self.log
+        target: Any = self._apart if topic in MEASURED_APART.values() else self.log
         if topic in topics.TRUTH:
             target = self._true = self._true or MeasuredStates.unknown(self.log)
         start = 0
@@ -230,7 +220,6 @@ class Rows:
             start += length
 
     def _note_errors(self, values: Array) -> None:
-        """Note e of messages (M, ...) with the tick and the rows of telemetry, if they are ours."""
         axes = self.log.axes
         if values.shape[1] == 1 + len(TELEMETRY_ROWS) * axes:
             first = 1 + TELEMETRY_ROWS.index("e") * axes
@@ -246,11 +235,11 @@ class Rows:
 
     def _columns(self) -> list[NDArray[Any]]:
         true = {} if self._true is None else self._true.columns
-        field = self._magnetometer.magnetic_field
-        return [*self.log.columns.values(), *true.values(), *self._sent_ns.values(), field]
+        apart = vars(self._apart).values()
+        return [*self.log.columns.values(), *true.values(), *self._sent_ns.values(), *apart]
 
     def _grow(self, ticks: int) -> None:
-        """Make room, within what can be believed; memory that is not touched costs nothing."""
+        # memory that is not touched costs nothing, but a wrong stamp must not cost gigabytes
         before = self._rows
         ticks = min(ticks, LONGEST_JUMP + self._believed)
         if ticks <= before:

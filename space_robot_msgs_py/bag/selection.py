@@ -1,22 +1,20 @@
-"""The messages of a bag that are ours: by topic, in a namespace or remapped, of the right type."""
+"""Messages of one robot's topics in a bag, by namespace, remapping and type."""
 
 from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Collection, Iterator, Mapping
 
-from space_robot_msgs_py.config.validation import full_namespace
-
 from .. import topics as graph
 from ..config.text import parse_json
-from ..config.validation import one_of
+from ..config.validation import full_namespace, one_of
 from ..errors import InputError
 from .batch import Batch
 from .folder import Bag, some_of
 from .recorder import FLIGHT_KEY, TOPICS_KEY
 
 REQUIRED = (graph.JOINT_STATES, graph.BASE_STATE, graph.REFERENCE_JOINTS, graph.REFERENCE_BASE)
-"""Topics that a flight cannot be read without."""
+"""Topics without which a flight cannot be read."""
 
 
 class Selection:
@@ -27,7 +25,7 @@ class Selection:
 
         Args:
             bag: a bag.
-            remap: our topic by theirs; it then stands for ours, even if the bag has ours too.
+            remap: our name of a topic by the bag's; a topic with our name is then ignored.
             namespace: the robot's; None: that of the only one in the bag.
 
         Raises:
@@ -36,7 +34,7 @@ class Selection:
         """
         self._bag, self._remap = bag, dict(remap)
         self.wrong: dict[str, str] = {}
-        """What is wrong with the type, by our topic."""
+        """Why a topic cannot be read, by our name of it."""
         for theirs, ours in self._remap.items():
             one_of(ours, graph.BY_NAME, "topic", f" to take {theirs} for")
             if list(self._remap.values()).count(ours) > 1:
@@ -101,7 +99,7 @@ class Selection:
     def _fits(self, topic: graph.Topic, kind: str, encoding: str) -> bool:
         if encoding != "cdr":
             self.wrong[topic.full_name] = f"encoded as {encoding!r}, 'cdr' is needed"
-        elif kind and not _is_type(kind, topic):
+        elif kind and not _is_type(kind, topic):  # unknown without definitions
             self.wrong[topic.full_name] = f"of type {kind}, {topic.type} is needed"
         else:
             return True
@@ -109,12 +107,11 @@ class Selection:
 
 
 def _is_type(kind: str, topic: graph.Topic) -> bool:
-    """Return True if a topic's type in a bag is ours, in ROS's or in DDS' spelling."""
+    # DDS has no /msg/ in the names of types
     return kind.replace("/msg/", "/") == topic.type.replace("/msg/", "/")
 
 
 def _noted_remappings(noted: Mapping[str, str]) -> dict[str, str]:
-    """Return our topic by the one that it was recorded as, as our recorder noted it."""
     try:
         remappings = parse_json(noted.get(TOPICS_KEY, "{}"))
         ours = list(remappings.values())
@@ -135,9 +132,6 @@ def find_namespace(bag: Bag, wanted: str | None, known: Collection[str], is_ours
 
     Returns:
         The root namespace if the bag has no robot: who reads it says what is missing.
-
-    Raises:
-        InputError: it has several robots, or none in the namespace that is wanted.
     """
     needed = [topic for topic in REQUIRED if topic.full_name not in known]
     namespaces = _count_namespaces(bag.topics(), needed)
@@ -164,7 +158,6 @@ def find_namespace(bag: Bag, wanted: str | None, known: Collection[str], is_ours
 
 
 def _count_namespaces(kinds: Mapping[str, str], needed: Collection[graph.Topic]) -> Counter[str]:
-    """Count by namespace the needed topics that are in a bag (type by full name)."""
     counts: Counter[str] = Counter()
     for name, kind in kinds.items():
         for topic in needed:

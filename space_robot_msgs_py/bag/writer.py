@@ -13,21 +13,14 @@ from contextlib import suppress
 from pathlib import Path
 from typing import IO, Any, Literal, cast
 
-from mcap.data_stream import RecordBuilder
-from mcap.records import DataEnd, Footer
-from mcap.writer import MCAP0_MAGIC, CompressionType, IndexType, Writer
+import yaml
+from mcap.writer import CompressionType, IndexType, Writer
 
 from ..errors import InputError
 from ..topics import Topic
 from ..wire.definitions import definition, jazzy
-from .rosbag2_yaml import FileSummary, bag_information, qos_profiles, to_yaml
 
 Compression = Literal["none", "lz4", "zstd"]
-_COMPRESSIONS: dict[Compression, CompressionType] = {
-    "none": CompressionType.NONE,
-    "lz4": CompressionType.LZ4,
-    "zstd": CompressionType.ZSTD,
-}
 DESCRIPTION = "space_robot"
 """Name of our metadata records: one at each file's beginning, one at the bag's end."""
 METADATA = "metadata.yaml"
@@ -36,6 +29,8 @@ _NEVER_FULL = 1 << 62
 """Size of a chunk: only `BagWriter.flush` ends one."""
 _MESSAGE_BYTES = 31
 """Length of a message's record without its data."""
+_NEVER_NS = 2**63 - 1
+"""Start of a bag without a message, as rosbag2 has it."""
 
 
 class BagWriter:
@@ -86,11 +81,7 @@ class BagWriter:
             raise InputError(f"{path}: no bag can be written there ({error.strerror})") from None
 
     def write(self, topic: Topic, log_ns: int, publish_ns: int, sequence: int, data: bytes) -> None:
-        """Add a message to the open chunk; the first after a full file begins another one.
-
-        Raises:
-            OSError: the next file cannot be begun.
-        """
+        """Add a message to the open chunk; the first after a full file begins another one."""
         channel, sequence = self._channels[topic.name], sequence & 0xFFFFFFFF
         if self._is_full:
             self._is_full = False
@@ -105,11 +96,7 @@ class BagWriter:
             self._latched[channel] = (publish_ns, sequence, data)
 
     def describe(self, description: Mapping[str, str]) -> None:
-        """Note more, or what is known better, in this file, those to come and at the end.
-
-        Raises:
-            OSError: that failed.
-        """
+        """Note more, or what is known better, in this file, those to come and at the end."""
         self._description |= description
         self._add_records(self._description, ())
         self._whole_bytes = self._files[-1].size
@@ -130,23 +117,17 @@ class BagWriter:
             self._is_full = 0 < self._split_size <= file.size
 
     def close(self, custom: Mapping[str, str]) -> None:
-        """Finish the last file and write metadata.yaml, after a `flush`.
-
-        Args:
-            custom: what goes, with the description, into the bag's custom data.
-
-        Raises:
-            OSError: that failed.
-        """
+        """Finish the last file and write metadata.yaml with more custom data, after a `flush`."""
         self._end_file(custom)
         information = self._information({**self._description, **custom}, self._topics)
-        text = to_yaml({"rosbag2_bagfile_information": information}) + "\n"
+        text = _to_yaml({"rosbag2_bagfile_information": information})
+        # a bag that has the file is finished, so it must appear whole
         part = self.path / f"{METADATA}.part"
         part.write_text(text, encoding="utf-8")
         part.replace(self.path / METADATA)
 
     def abandon(self) -> None:
-        """After a failure: leave the whole chunks and, if there is room, a valid MCAP end."""
+        """Leave the whole chunks, after a failure."""
         self._files[-1].abandon(self._whole_bytes)
 
     def _begin_file(self) -> None:
@@ -168,14 +149,78 @@ class BagWriter:
         writer = self._files[-1].writer
         writer.add_metadata(DESCRIPTION, dict(custom))
         # rosbag2 has the bag's metadata at both ends of a file, too; `reindex` reads them
-        text = to_yaml(self._information(custom, topics))
+        text = _to_yaml(self._information(custom, topics))
         writer.add_metadata("rosbag2", {"serialized_metadata": text})
 
     def _information(self, custom: Mapping[str, str], topics: Sequence[Topic]) -> dict[str, object]:
+        """Return what metadata.yaml says (version 9, Jazzy's), in the order of rosbag2's keys."""
         counts = sum((file.counts for file in self._files), Counter[int]())
-        files = [FileSummary(f.path.name, f.span_ns, f.counts.total()) for f in self._files]
-        counted = [(topic, counts[self._channels[topic.name]]) for topic in topics]
-        return bag_information(files, counted, custom)
+        start, duration = _times(self._files)
+        return {
+            "version": 9,
+            "storage_identifier": "mcap",
+            "duration": duration,
+            "starting_time": start,
+            "message_count": counts.total(),
+            "topics_with_message_count": [
+                {
+                    "topic_metadata": {
+                        "name": topic.full_name,
+                        "type": topic.type,
+                        "serialization_format": "cdr",
+                        "offered_qos_profiles": _qos_profiles(topic),
+                        "type_description_hash": jazzy().hash_rihs01(topic.type),
+                    },
+                    "message_count": counts[self._channels[topic.name]],
+                }
+                for topic in topics
+            ],
+            # of whole files or messages, which rosbag2 does beside MCAP; chunks say it themselves
+            "compression_format": "",
+            "compression_mode": "",
+            "relative_file_paths": [file.path.name for file in self._files],
+            "files": [
+                {
+                    "path": file.path.name,
+                    **dict(zip(("starting_time", "duration"), _times([file]), strict=True)),
+                    "message_count": file.counts.total(),
+                }
+                for file in self._files
+            ],
+            "custom_data": dict(custom) or None,
+            "ros_distro": "jazzy",
+        }
+
+
+def _times(files: Sequence[_McapFile]) -> tuple[dict[str, int], dict[str, int]]:
+    spans_ns = [file.span_ns for file in files if file.span_ns]
+    first = min((first for first, _ in spans_ns), default=_NEVER_NS)
+    last = max((last for _, last in spans_ns), default=_NEVER_NS)
+    return {"nanoseconds_since_epoch": first}, {"nanoseconds": last - first}
+
+
+def _qos_profiles(topic: Topic) -> list[dict[str, Any]]:
+    forever = {"sec": 9223372036, "nsec": 854775807}
+    return [
+        {
+            "history": "keep_last",
+            "depth": topic.depth,
+            "reliability": "reliable",
+            "durability": "transient_local" if topic.transient_local else "volatile",
+            "deadline": {**forever},
+            "lifespan": {**forever},
+            "liveliness": "automatic",
+            "liveliness_lease_duration": {**forever},
+            "avoid_ros_namespace_conventions": False,
+        }
+    ]
+
+
+def _to_yaml(value: Any) -> str:
+    # PyYAML's own code looks at each letter of the long descriptions in Python
+    dumper = getattr(yaml, "CSafeDumper", yaml.SafeDumper)
+    text: str = yaml.dump(value, Dumper=dumper, sort_keys=False, width=2**31 - 1)
+    return text
 
 
 class _McapFile:
@@ -189,11 +234,12 @@ class _McapFile:
         """Number of messages by channel."""
         self.span_ns: tuple[int, int] | None = None
         """First and last log time (None: no message)."""
+        # what is written is with the kernel, and survives this process
         self._file = path.open("xb", buffering=0)
         self.writer = Writer(
             cast(IO[Any], self),
             chunk_size=_NEVER_FULL,
-            compression=_COMPRESSIONS[compression],
+            compression=CompressionType[compression.upper()],
             index_types=_INDEXES,
         )
         try:
@@ -207,7 +253,7 @@ class _McapFile:
         }
         for topic in topics:
             metadata = {
-                "offered_qos_profiles": to_yaml(qos_profiles(topic)),
+                "offered_qos_profiles": _to_yaml(_qos_profiles(topic)),
                 "topic_type_hash": jazzy().hash_rihs01(topic.type),
             }
             self.writer.register_channel(topic.full_name, "cdr", schemas[topic.type], metadata)
@@ -225,16 +271,11 @@ class _McapFile:
         self._file.close()
 
     def abandon(self, size: int) -> None:
-        """Keep the first ``size`` bytes and, if there is room, end the file."""
-        if self._file.closed:
-            return
-        end = RecordBuilder()
-        DataEnd(0).write(end)
-        Footer(0, 0, 0).write(end)
-        with suppress(OSError):
-            self._file.truncate(size)
-            os.pwrite(self._file.fileno(), end.end() + MCAP0_MAGIC, size)
-        self._file.close()
+        """Keep the first ``size`` bytes, as a killed recorder leaves a file."""
+        if not self._file.closed:
+            with suppress(OSError):
+                self._file.truncate(size)
+            self._file.close()
 
     def remove(self) -> None:
         """Close and delete the file."""

@@ -57,7 +57,6 @@ def cache_directory() -> Path:
 
 
 def _unusable(folder: Path) -> str:
-    """Return why a folder cannot hold the cache; empty if it can, or already does."""
     try:
         is_new = not folder.is_dir()
         folder.mkdir(parents=True, exist_ok=True)
@@ -72,7 +71,7 @@ def _unusable(folder: Path) -> str:
 
 
 def _temporary_cache() -> Path:
-    """Return a folder owned by this user only, since code in it is executed."""
+    # of this user only: code in it is executed
     folder = Path(tempfile.gettempdir()) / f"space_robot_{os.getuid()}"
     try:
         folder.mkdir(mode=0o700, exist_ok=True)
@@ -118,7 +117,6 @@ def _written_ns(file: str) -> int:
 
 
 def _called(function: Any) -> Iterator[Any]:
-    """Yield the kernels and subroutines that a function refers to."""
     for name in _names(function.__code__):
         value = function.__globals__.get(name)
         if hasattr(value, "py_func"):

@@ -76,8 +76,6 @@ class _KernelCache(_FunctionCache):  # type: ignore[misc]
 
 
 class _Callback(_CFunc):  # type: ignore[misc]
-    """A function to be called by its address, with the same cache."""
-
     def enable_caching(self) -> None:
         with _our_cache():
             self._cache = _KernelCache(self._pyfunc)
@@ -159,7 +157,6 @@ keep_types(RecordFunction, lambda function: function)
 
 
 def _reason(error: NumbaError) -> str:
-    """Return the relevant line of an error of Numba, with the position in the source."""
     lines = [line.strip() for line in _COLOURS.sub("", str(error)).splitlines()]
     reasons = [line for line in lines if line and not line.startswith(("Failed in", "File "))]
     place = re.search(r'File "(.+?)", (line \d+)', "\n".join(lines))
@@ -173,7 +170,7 @@ def _signature(records: Iterable[type[Record]], width: int) -> Any:
 
 @contextmanager
 def _our_cache() -> Iterator[None]:
-    """Set the cache folder while Numba decorates, when it reads the setting."""
+    # Numba reads the setting while it decorates
     previous = config.CACHE_DIR
     config.CACHE_DIR = str(cache_directory())
     try:

@@ -17,6 +17,7 @@ import numpy as np
 from llvmlite import ir
 from numba.core import cgutils, types
 from numba.core.imputils import lower_builtin, lower_cast
+from numba.core.registry import cpu_target
 from numba.core.typeconv.castgraph import Conversion
 from numba.core.typing.templates import AbstractTemplate, infer_global, signature
 from numba.extending import models, register_model
@@ -121,11 +122,23 @@ def _boolean_to_mask(context: Any, builder: Any, fromty: Any, toty: Any, value: 
 
 
 def _spread(builder: Any, value: Any, vector: Any) -> Any:
-    """Emit a vector with ``value`` in each lane."""
     unknown = ir.Constant(vector, ir.Undefined)
     first = builder.insert_element(unknown, value, INDEX(0))
     zeros = ir.Constant(ir.VectorType(INDEX, WIDTH), [0] * WIDTH)
     return builder.shuffle_vector(first, unknown, zeros)
+
+
+_CONDITIONS, _SCALARS = (
+    (MaskType, types.Boolean),
+    (LaneType, MaskType, types.Number, types.Boolean),
+)
+_EITHER_CONDITION = tuple((kind,) for kind in _CONDITIONS)
+
+
+def _plain(kind: Any) -> Any:
+    if kind in (LANE, MASK):
+        return types.float64 if kind == LANE else types.boolean
+    return types.unliteral(kind)
 
 
 # Arithmetic, comparisons and functions
@@ -140,31 +153,51 @@ def _some_lanes(args: Any) -> bool:
 
 
 def _some_masks(args: Any) -> bool:
-    return MASK in args and all(isinstance(kind, (MaskType, types.Boolean)) for kind in args)
+    return MASK in args and all(isinstance(kind, _CONDITIONS) for kind in args)
 
 
-def _define(function: Any, arity: int, result: Any, build: _Build, of: Any = LANE) -> None:
-    """Define ``function`` of lanes, or masks, with the instructions emitted by ``build``."""
-    accepts = _some_lanes if of is LANE else _some_masks
+def defines(function: Any, typing: Callable[..., Any], *kinds: tuple[Any, ...]) -> Any:
+    """Return a decorator: what it decorates emits ``function`` for arguments of these kinds.
 
-    class Pointwise(AbstractTemplate):
+    Args:
+        function: as kernels call it.
+        typing: from the arguments' types to the signature; None: these are not for us.
+        kinds: classes of types.
+    """
+
+    class Template(AbstractTemplate):
         key = function
 
         def generic(self, args: Any, kws: Any) -> Any:
-            if len(args) == arity and not kws and accepts(args):
-                return signature(result, *[of] * arity)
-            return None
+            return None if kws else typing(*args)
 
-    def lower(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        return build(builder, *args)
+    def decorate(emit: _Build) -> _Build:
+        infer_global(function)(Template)
+        for kind in kinds:
+            lower_builtin(function, *kind)(emit)
+        return emit
 
-    infer_global(function)(Pointwise)
-    lower_builtin(function, *[type(of)] * arity)(lower)
+    return decorate
+
+
+def _define_all(
+    functions: dict[Any, _Build], arity: int, result: Any = LANE, of: Any = LANE
+) -> None:
+    accepts = _some_lanes if of is LANE else _some_masks
+
+    def typing(*args: Any) -> Any:
+        return signature(result, *[of] * arity) if len(args) == arity and accepts(args) else None
+
+    for names, build in functions.items():
+
+        def emit(context: Any, builder: Any, sig: Any, args: Any, build: _Build = build) -> Any:
+            return build(builder, *args)
+
+        for function in names if isinstance(names, tuple) else (names,):
+            defines(function, typing, (type(of),) * arity)(emit)
 
 
 def _intrinsic(name: str, arity: int = 1) -> _Build:
-    """Return an emitter of a vector function of LLVM."""
-
     def build(builder: Any, *args: Any) -> Any:
         kind = ir.FunctionType(LANE_VECTOR, [LANE_VECTOR] * arity)
         whole_name = f"llvm.{name}.v{WIDTH}f64"
@@ -204,14 +237,6 @@ def _is_finite(builder: Any, x: Any) -> Any:
 
 def _is_nan(builder: Any, x: Any) -> Any:
     return builder.fcmp_unordered("uno", x, x)
-
-
-def _define_all(
-    functions: dict[Any, _Build], arity: int, result: Any = LANE, of: Any = LANE
-) -> None:
-    for names, build in functions.items():
-        for function in names if isinstance(names, tuple) else (names,):
-            _define(function, arity, result, build, of)
 
 
 _define_all(
@@ -262,13 +287,11 @@ _define_all(
 )
 
 
-@infer_global(math.frexp)
-class _Exponent(AbstractTemplate):
-    def generic(self, args: Any, kws: Any) -> Any:
-        return signature(types.UniTuple(LANE, 2), LANE) if args == (LANE,) else None
+def _type_of_exponent(kind: Any) -> Any:
+    return signature(types.UniTuple(LANE, 2), LANE) if kind == LANE else None
 
 
-@lower_builtin(math.frexp, LaneType)
+@defines(math.frexp, _type_of_exponent, (LaneType,))
 def _exponent(context: Any, builder: Any, sig: Any, args: Any) -> Any:
     """Emit mantissa and exponent, both as floats, from the bits of a float."""
     (x,) = args
@@ -293,13 +316,11 @@ def _exponent(context: Any, builder: Any, sig: Any, args: Any) -> Any:
     )
 
 
-@infer_global(np.fmod)
-class _Remainder(AbstractTemplate):
-    def generic(self, args: Any, kws: Any) -> Any:
-        return signature(LANE, LANE, LANE) if _some_lanes(args) else None
+def _type_of_remainder(*args: Any) -> Any:
+    return signature(LANE, LANE, LANE) if _some_lanes(args) else None
 
 
-@lower_builtin(np.fmod, LaneType, LaneType)
+@defines(np.fmod, _type_of_remainder, (LaneType, LaneType))
 def _remainder(context: Any, builder: Any, sig: Any, args: Any) -> Any:
     """Emit the function of plain numbers lane by lane: it is rare."""
     plain = signature(types.float64, types.float64, types.float64)
@@ -314,41 +335,29 @@ def _remainder(context: Any, builder: Any, sig: Any, args: Any) -> Any:
 # Choices of values, and what all lanes share
 
 
-@infer_global(negated)
-class _Negated(AbstractTemplate):
-    def generic(self, args: Any, kws: Any) -> Any:
-        (kind,) = args
-        return signature(kind, kind) if isinstance(kind, (types.Boolean, MaskType)) else None
+def _type_of_negated(kind: Any) -> Any:
+    return signature(kind, kind) if isinstance(kind, _CONDITIONS) else None
 
 
-@lower_builtin(negated, types.Boolean)
-@lower_builtin(negated, MaskType)
+@defines(negated, _type_of_negated, *_EITHER_CONDITION)
 def _negated(context: Any, builder: Any, sig: Any, args: Any) -> Any:
     return builder.not_(args[0])
 
 
-@infer_global(where)
-class _Where(AbstractTemplate):
-    def generic(self, args: Any, kws: Any) -> Any:
-        if len(args) != 3 or kws:
-            return None
-        condition, *values = args
-        result = self.context.unify_types(*(types.unliteral(value) for value in values))
-        if isinstance(result, types.UniTuple):
-            is_known = isinstance(condition, (types.Boolean, MaskType))
-            return signature(result, condition, result, result) if is_known else None
-        if condition == MASK:
-            result = MASK if result == types.boolean else result
-            result = LANE if isinstance(result, types.Number) else result
-            return signature(result, MASK, result, result) if result in (LANE, MASK) else None
-        if not isinstance(condition, types.Boolean):
-            return None
-        scalars = (types.Number, types.Boolean, LaneType, MaskType)
-        return signature(result, condition, result, result) if isinstance(result, scalars) else None
+def _type_of_where(condition: Any, *values: Any) -> Any:
+    if not isinstance(condition, _CONDITIONS):
+        return None
+    result = cpu_target.typing_context.unify_types(*map(types.unliteral, values))
+    if isinstance(result, types.UniTuple):
+        return signature(result, condition, result, result)
+    if condition == MASK:
+        result = MASK if result == types.boolean else result
+        result = LANE if isinstance(result, types.Number) else result
+        return signature(result, MASK, result, result) if result in (LANE, MASK) else None
+    return signature(result, condition, result, result) if isinstance(result, _SCALARS) else None
 
 
-@lower_builtin(where, MaskType, types.Any, types.Any)
-@lower_builtin(where, types.Boolean, types.Any, types.Any)
+@defines(where, _type_of_where, *((kind, types.Any, types.Any) for kind in _CONDITIONS))
 def _where(context: Any, builder: Any, sig: Any, args: Any) -> Any:
     condition, *values = args
     if not isinstance(sig.return_type, types.UniTuple):
@@ -357,116 +366,69 @@ def _where(context: Any, builder: Any, sig: Any, args: Any) -> Any:
     return cgutils.pack_array(builder, [builder.select(condition, *pair) for pair in pairs])
 
 
-def _reads_one(function: Any, of_number: Any, of_lane: Any, emit: _Build) -> None:
-    """Define a function of the first lane, or of a plain number."""
+def _reads_one(function: Any, result: Callable[[Any], Any]) -> None:
+    def typing(kind: Any) -> Any:
+        return signature(result(kind), kind) if isinstance(kind, _SCALARS) else None
 
-    class OfFirstLane(AbstractTemplate):
-        key = function
-
-        def generic(self, args: Any, kws: Any) -> Any:
-            (kind,) = args
-            if kind in (LANE, MASK):
-                return signature(of_lane(kind), kind)
-            if isinstance(kind, (types.Number, types.Boolean)):
-                return signature(of_number(kind), kind)
-            return None
-
-    def lower(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+    @defines(function, typing, *((kind,) for kind in _SCALARS))
+    def emit(context: Any, builder: Any, sig: Any, args: Any) -> Any:
         value, kind = args[0], sig.args[0]
         if kind in (LANE, MASK):
-            value = builder.extract_element(value, INDEX(0))
-            kind = types.float64 if kind == LANE else types.boolean
-        return emit(context, builder, value, kind, sig.return_type)
-
-    infer_global(function)(OfFirstLane)
-    for kind in (LaneType, MaskType, types.Number, types.Boolean):
-        lower_builtin(function, kind)(lower)
+            value, kind = builder.extract_element(value, INDEX(0)), _plain(kind)
+        return context.cast(builder, value, kind, sig.return_type)
 
 
-_reads_one(
-    uniform,
-    types.unliteral,
-    lambda kind: types.float64 if kind == LANE else types.boolean,
-    lambda context, builder, value, kind, result: value,
-)
-_reads_one(
-    whole,
-    lambda kind: types.intp,
-    lambda kind: types.intp,
-    lambda context, builder, value, kind, result: context.cast(builder, value, kind, result),
-)
+_reads_one(uniform, _plain)
+_reads_one(whole, lambda kind: types.intp)
 
 
 def _reduces(function: Any, name: str) -> None:
-    """Define a function of all lanes of a mask, or of a plain truth value."""
+    def typing(kind: Any) -> Any:
+        return signature(types.boolean, kind) if isinstance(kind, _CONDITIONS) else None
 
-    class OfAllLanes(AbstractTemplate):
-        key = function
-
-        def generic(self, args: Any, kws: Any) -> Any:
-            (kind,) = args
-            is_condition = isinstance(kind, (MaskType, types.Boolean))
-            return signature(types.boolean, kind) if is_condition else None
-
-    def lower(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+    @defines(function, typing, *_EITHER_CONDITION)
+    def emit(context: Any, builder: Any, sig: Any, args: Any) -> Any:
         if sig.args[0] != MASK:
             return args[0]
         kind = ir.FunctionType(BIT, [MASK_VECTOR])
         whole_name = f"llvm.vector.reduce.{name}.v{WIDTH}i1"
         return builder.call(cgutils.get_or_insert_function(builder.module, kind, whole_name), args)
 
-    infer_global(function)(OfAllLanes)
-    for kind in (MaskType, types.Boolean):
-        lower_builtin(function, kind)(lower)
-
 
 _reduces(any_lane, "or")
 _reduces(all_lanes, "and")
 
 
-@infer_global(lane_of)
-class _LaneOf(AbstractTemplate):
-    def generic(self, args: Any, kws: Any) -> Any:
-        kind, _ = args
-        if kind in (LANE, MASK):
-            return signature(types.float64 if kind == LANE else types.boolean, kind, types.intp)
-        return signature(kind, kind, types.intp) if isinstance(kind, types.Float) else None
+def _type_of_lane(kind: Any, lane: Any) -> Any:
+    known = (LaneType, MaskType, types.Float)
+    return signature(_plain(kind), kind, types.intp) if isinstance(kind, known) else None
 
 
-@lower_builtin(lane_of, LaneType, types.Integer)
-@lower_builtin(lane_of, MaskType, types.Integer)
+@defines(
+    lane_of, _type_of_lane, *((kind, types.Integer) for kind in (LaneType, MaskType, types.Float))
+)
 def _lane_of(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-    return builder.extract_element(*args)
+    return builder.extract_element(*args) if sig.args[0] in (LANE, MASK) else args[0]
 
 
-@lower_builtin(lane_of, types.Float, types.Integer)
-def _lane_of_number(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-    return args[0]
+def _type_with_lane(kind: Any, lane: Any, number: Any) -> Any:
+    return signature(LANE, LANE, types.intp, types.float64) if kind == LANE else None
 
 
-@infer_global(with_lane)
-class _WithLane(AbstractTemplate):
-    def generic(self, args: Any, kws: Any) -> Any:
-        return signature(LANE, LANE, types.intp, types.float64) if args[0] == LANE else None
-
-
-@lower_builtin(with_lane, LaneType, types.Integer, types.Float)
+@defines(with_lane, _type_with_lane, (LaneType, types.Integer, types.Float))
 def _with_lane(context: Any, builder: Any, sig: Any, args: Any) -> Any:
     value, lane, number = args
     return builder.insert_element(value, number, lane)
 
 
-@infer_global(as_lanes)
-class _AsLanes(AbstractTemplate):
-    def generic(self, args: Any, kws: Any) -> Any:
-        (kind,) = args
-        is_array = isinstance(kind, types.Array) and kind.dtype == types.float64
-        if not is_array or kind.layout != "C" or kind.ndim < 1:
-            return None
-        return signature(array_of_lanes(kind.ndim - 1) if kind.ndim > 1 else LANE, kind)
+def _type_as_lanes(kind: Any) -> Any:
+    is_array = isinstance(kind, types.Array) and kind.dtype == types.float64
+    if not is_array or kind.layout != "C" or kind.ndim < 1:
+        return None
+    return signature(array_of_lanes(kind.ndim - 1) if kind.ndim > 1 else LANE, kind)
 
 
-@lower_builtin(as_lanes, types.Array)
+@defines(as_lanes, _type_as_lanes, (types.Array,))
 def _as_lanes(context: Any, builder: Any, sig: Any, args: Any) -> Any:
     from numba.np import arrayobj  # only the compiler needs it
 
@@ -478,17 +440,14 @@ def _as_lanes(context: Any, builder: Any, sig: Any, args: Any) -> Any:
     return array_over(context, builder, sig.return_type, data, shape[:-1], strides[:-1], 8 * WIDTH)
 
 
-@infer_global(as_numbers)
-class _AsNumbers(AbstractTemplate):
-    def generic(self, args: Any, kws: Any) -> Any:
-        (kind,) = args
-        is_array = isinstance(kind, types.Array) and kind.dtype in (LANE, types.float64)
-        if not is_array or kind.layout != "C":
-            return None
-        return signature(types.Array(types.float64, kind.ndim + 1, "C"), kind)
+def _type_as_numbers(kind: Any) -> Any:
+    is_array = isinstance(kind, types.Array) and kind.dtype in (LANE, types.float64)
+    if not is_array or kind.layout != "C":
+        return None
+    return signature(types.Array(types.float64, kind.ndim + 1, "C"), kind)
 
 
-@lower_builtin(as_numbers, types.Array)
+@defines(as_numbers, _type_as_numbers, (types.Array,))
 def _as_numbers(context: Any, builder: Any, sig: Any, args: Any) -> Any:
     from numba.np import arrayobj  # only the compiler needs it
 

@@ -22,17 +22,11 @@ import numpy as np
 from numba.core import cgutils, imputils, types
 from numba.core.pythonapi import NativeValue
 from numba.core.registry import cpu_target
-from numba.core.typing.templates import (
-    AbstractTemplate,
-    AttributeTemplate,
-    infer_getattr,
-    infer_global,
-    signature,
-)
+from numba.core.typing.templates import AttributeTemplate, infer_getattr, signature
 from numba.core.typing.typeof import typeof_impl
 from numba.extending import models, register_model, unbox
 
-from .lane_type import LANE, array_of_lanes, array_over
+from .lane_type import LANE, array_of_lanes, array_over, defines
 from .records import Dimension, Layout, Polynomial, layout_of
 
 BYTES = 8
@@ -255,31 +249,16 @@ def _size_of_block(context: Any, builder: Any, kind: BlockType, value: Any) -> A
     return cgutils.create_struct_proxy(kind)(context, builder, value=value).size
 
 
-@infer_global(operator.getitem)
-class _GetItem(AbstractTemplate):
-    def generic(self, args: Any, kws: Any) -> Any:
-        block, index = args
-        if not isinstance(block, BlockType):
-            return None
-        if isinstance(index, types.Integer):
-            return signature(block.record, block, types.intp)
-        return signature(block, block, index) if isinstance(index, types.SliceType) else None
-
-
-@infer_global(operator.setitem)
-class _SetItem(AbstractTemplate):
-    def generic(self, args: Any, kws: Any) -> Any:
-        block, _, record = args
-        if not isinstance(block, BlockType) or record != block.record:
-            return None
-        return signature(types.void, block, types.intp, record)
-
-
 def _item(builder: Any, block: Any, index: Any) -> Any:
     return cgutils.pointer_add(builder, block.data, builder.mul(index, block.step, flags=["nsw"]))
 
 
-@imputils.lower_builtin(operator.getitem, BlockType, types.Integer)
+def _type_of_item(block: Any, index: Any) -> Any:
+    is_one = isinstance(block, BlockType) and isinstance(index, types.Integer)
+    return signature(block.record, block, types.intp) if is_one else None
+
+
+@defines(operator.getitem, _type_of_item, (BlockType, types.Integer))
 def _get_item(context: Any, builder: Any, sig: Any, args: Any) -> Any:
     block = cgutils.create_struct_proxy(sig.args[0])(context, builder, value=args[0])
     record = cgutils.create_struct_proxy(sig.return_type)(context, builder)
@@ -287,7 +266,12 @@ def _get_item(context: Any, builder: Any, sig: Any, args: Any) -> Any:
     return record._getvalue()
 
 
-@imputils.lower_builtin(operator.getitem, BlockType, types.SliceType)
+def _type_of_part(block: Any, index: Any) -> Any:
+    is_part = isinstance(block, BlockType) and isinstance(index, types.SliceType)
+    return signature(block, block, index) if is_part else None
+
+
+@defines(operator.getitem, _type_of_part, (BlockType, types.SliceType))
 def _get_items(context: Any, builder: Any, sig: Any, args: Any) -> Any:
     from numba.cpython import slicing  # only the compiler needs it
 
@@ -303,7 +287,12 @@ def _get_items(context: Any, builder: Any, sig: Any, args: Any) -> Any:
     return proxy._getvalue()
 
 
-@imputils.lower_builtin(operator.setitem, BlockType, types.Integer, RecordType)
+def _type_of_assignment(block: Any, index: Any, record: Any) -> Any:
+    fits = isinstance(block, BlockType) and record == block.record
+    return signature(types.void, block, types.intp, record) if fits else None
+
+
+@defines(operator.setitem, _type_of_assignment, (BlockType, types.Integer, RecordType))
 def _set_item(context: Any, builder: Any, sig: Any, args: Any) -> Any:
     kind, _, record_type = sig.args
     block = cgutils.create_struct_proxy(kind)(context, builder, value=args[0])

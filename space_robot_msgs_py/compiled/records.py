@@ -10,6 +10,7 @@ offsets are polynomials of n.
 from __future__ import annotations
 
 import copy
+import math
 from collections.abc import Callable
 from dataclasses import KW_ONLY, dataclass
 from functools import cache, lru_cache
@@ -29,6 +30,7 @@ Source = str | Callable[[Any, Any], Any]
 """Path of an attribute, or a function of what there is to fill a record from."""
 DEGREE = 2
 """Highest power of n in the size of a field, as in a matrix."""
+MOST_KEPT = 1024
 
 
 class Dimension(NamedTuple):
@@ -45,22 +47,6 @@ class Polynomial(NamedTuple):
     b: int = 0
     c: int = 0
 
-    def plus(self, other: Polynomial) -> Polynomial:
-        """Return the sum."""
-        return Polynomial(self.a + other.a, self.b + other.b, self.c + other.c)
-
-    def times(self, dimension: Dimension) -> Polynomial:
-        """Return the product.
-
-        Raises:
-            TypeError: the power of n exceeds `DEGREE`.
-        """
-        constant, slope = dimension
-        if self.c * slope:
-            raise TypeError(f"a field's size may grow with n to the power of {DEGREE} at most")
-        b, c = self.b * constant + self.a * slope, self.c * constant + self.b * slope
-        return Polynomial(self.a * constant, b, c)
-
 
 @dataclass(frozen=True)
 class Layout:
@@ -75,43 +61,39 @@ class Layout:
     @property
     def size(self) -> Polynomial:
         """Number of float64 in the record."""
-        return _end_of(self.fields)
+        return _size_of(self.fields)
 
     def find(self, name: str) -> tuple[Polynomial, tuple[Dimension, ...] | Layout] | None:
         """Return offset, in numbers, and shape or layout of a field; None if it does not exist."""
         for k, (known, kind) in enumerate(self.fields):
             if known == name:
-                return _end_of(self.fields[:k]), kind
+                return _size_of(self.fields[:k]), kind
         return None
 
 
-def _end_of(fields: tuple[tuple[str, tuple[Dimension, ...] | Layout], ...]) -> Polynomial:
-    total = Polynomial()
-    for _, kind in fields:
-        total = total.plus(kind.size if isinstance(kind, Layout) else count(kind))
-    return total
+def _size_of(fields: tuple[tuple[str, tuple[Dimension, ...] | Layout], ...]) -> Polynomial:
+    # three values of n determine a polynomial of the second degree
+    at_0, at_1, at_2 = (sum(_count(kind, n) for _, kind in fields) for n in range(DEGREE + 1))
+    c = (at_2 - 2 * at_1 + at_0) // 2
+    return Polynomial(at_0, at_1 - at_0 - c, c)
 
 
-def count(dimensions: tuple[Dimension, ...]) -> Polynomial:
-    """Return the number of elements of an array."""
-    total = Polynomial(1)
-    for dimension in dimensions:
-        total = total.times(dimension)
-    return total
+def _count(kind: tuple[Dimension, ...] | Layout, n: int) -> int:
+    if isinstance(kind, Layout):
+        return sum(_count(inner, n) for _, inner in kind.fields)
+    return math.prod(constant + slope * n for constant, slope in kind)
 
 
 def dimensions_of(name: str, shape: Callable[[int], tuple[int, ...]]) -> tuple[Dimension, ...]:
-    """Derive the formula of a shape from its values.
-
-    Raises:
-        TypeError: a dimension is not ``a + b n``.
-    """
+    """Derive the formula of a shape from its values."""
     dimensions = tuple(
         Dimension(at_0, at_1 - at_0) for at_0, at_1 in zip(shape(0), shape(1), strict=True)
     )
     for n in (2, 7):
         if tuple(constant + slope * n for constant, slope in dimensions) != shape(n):
             raise TypeError(f"the shape of field {name!r} must be linear in n")
+    if sum(slope != 0 for _, slope in dimensions) > DEGREE:
+        raise TypeError(f"field {name!r} may grow with n to the power of {DEGREE} at most")
     return dimensions
 
 
@@ -155,22 +137,43 @@ class Record:
     """Class of its `view`."""
 
     @classmethod
+    @cache
     def fields(cls) -> dict[str, Field | type[Record]]:
         """Return the fields by name, in memory order."""
-        record: Any = cls
-        return _fields(record)
+        return {
+            name: value
+            for base in reversed(cls.__mro__)
+            for name, value in vars(base).items()
+            if isinstance(value, Field) or (isinstance(value, type) and issubclass(value, Record))
+        }
 
     @classmethod
+    @cache
     def layout(cls) -> Layout:
         """Return the memory layout for any number of joints."""
-        record: Any = cls
-        return _layout(record)
+        return Layout(
+            tuple(
+                (name, dimensions_of(name, v.shape) if isinstance(v, Field) else v.layout())
+                for name, v in cls.fields().items()
+            )
+        )
 
     @classmethod
+    @lru_cache(maxsize=512)
     def dtype(cls, n: int, width: int = 1) -> np.dtype[Any]:
         """Return the memory layout for a robot with ``n`` joints, of numbers of a width."""
-        record: Any = cls
-        return _dtype(record, n, width)
+        fields: list[Any] = []
+        lanes = (width,) if width > 1 else ()
+        for name, value in cls.fields().items():
+            if isinstance(value, Field):
+                fields.append((name, np.float64, value.shape(n) + lanes))
+            else:
+                fields.append((name, value.dtype(n, width)))
+        dtype = np.dtype((np.record, np.dtype(fields, align=True)))
+        known = cls.layout(), width
+        if _LAYOUTS.setdefault(dtype, known) != known:
+            raise TypeError(f"{cls.__name__} cannot be told from another record of equal names")
+        return dtype
 
     @classmethod
     def block(cls, n: int) -> Block:
@@ -191,9 +194,21 @@ class Record:
     @classmethod
     def uniform_numbers(cls, block: Block) -> bytes:
         """Return the numbers of a block (1,) that must be the same in all lanes."""
-        record: Any = cls
         numbers: NDArray[np.float64] = block.view(np.float64)
-        return numbers[_uniform_places(record, block.dtype)].tobytes()
+        return numbers[cls._uniform_places(block.dtype)].tobytes()
+
+    @classmethod
+    @lru_cache(maxsize=256)
+    def _uniform_places(cls, dtype: np.dtype[Any]) -> NDArray[np.intp]:
+        places: list[NDArray[np.intp]] = [np.empty(0, np.intp)]
+        for name, value in cls.fields().items():
+            assert dtype.fields is not None
+            kind, offset = dtype.fields[name][:2]
+            if not isinstance(value, Field):
+                places.append(offset // 8 + value._uniform_places(kind))
+            elif value.uniform:
+                places.append(offset // 8 + np.arange(kind.itemsize // 8))
+        return np.concatenate(places)
 
     @classmethod
     def allocate(cls, n: int) -> Self:
@@ -245,11 +260,7 @@ class RecordView(SimpleNamespace):
             super().__setattr__(name, value)
 
     def __reduce__(self) -> Any:
-        """Refuse copying and pickling.
-
-        Raises:
-            TypeError: always.
-        """
+        """Refuse copying and pickling."""
         raise TypeError(
             "a view of a record cannot be copied or pickled: copy the object that owns its block "
             "(a law, a controller, a plant, a bench), and omit views in its __getstate__"
@@ -274,11 +285,7 @@ class RecordOwner:
         raise NotImplementedError
 
     def __getstate__(self) -> dict[str, Any]:
-        """Return all attributes except the views.
-
-        Raises:
-            TypeError: an undeclared attribute is a view of a block.
-        """
+        """Return all attributes except the views."""
         state = {name: value for name, value in vars(self).items() if name not in self._views}
         arrays = {name: value for name, value in state.items() if isinstance(value, np.ndarray)}
         blocks = [array for array in arrays.values() if array.dtype.names]
@@ -311,59 +318,9 @@ def assign(record: Record, **values: Any) -> None:
         cast(Any, record)[name] = value
 
 
-@cache
-def _fields(record: type) -> dict[str, Field | type[Record]]:
-    return {
-        name: value
-        for base in reversed(record.__mro__)
-        for name, value in vars(base).items()
-        if isinstance(value, Field) or (isinstance(value, type) and issubclass(value, Record))
-    }
-
-
-@cache
-def _layout(record: Any) -> Layout:
-    fields: list[Any] = []
-    for name, value in record.fields().items():
-        is_field = isinstance(value, Field)
-        fields.append((name, dimensions_of(name, value.shape) if is_field else value.layout()))
-    return Layout(tuple(fields))
-
-
-@lru_cache(maxsize=512)
-def _dtype(record: Any, n: int, width: int = 1) -> np.dtype[Any]:
-    fields: list[Any] = []
-    lanes = (width,) if width > 1 else ()
-    for name, value in record.fields().items():
-        if isinstance(value, Field):
-            fields.append((name, np.float64, value.shape(n) + lanes))
-        else:
-            fields.append((name, _dtype(value, n, width)))
-    dtype = np.dtype((np.record, np.dtype(fields, align=True)))
-    known = record.layout(), width
-    if _LAYOUTS.setdefault(dtype, known) != known:
-        raise TypeError(f"{record.__name__} cannot be told from another record of equal names")
-    return dtype
-
-
-@lru_cache(maxsize=256)
-def _uniform_places(record: Any, dtype: np.dtype[Any]) -> NDArray[np.intp]:
-    """Return the places of the numbers of uniform fields in a record of a layout."""
-    places: list[NDArray[np.intp]] = [np.empty(0, np.intp)]
-    for name, value in record.fields().items():
-        assert dtype.fields is not None
-        kind, offset = dtype.fields[name][:2]
-        if not isinstance(value, Field):
-            places.append(offset // 8 + _uniform_places(value, kind))
-        elif value.uniform:
-            places.append(offset // 8 + np.arange(kind.itemsize // 8))
-    return np.concatenate(places)
-
-
 _LAYOUTS: dict[np.dtype[Any], tuple[Layout, int]] = {}
 _LAYOUTS_BY_ID: dict[int, tuple[np.dtype[Any], tuple[Layout, int]]] = {}
 """Results of `layout_of` by the identity of the dtype: its hash takes longer than a tick."""
-MOST_KEPT = 1024
 
 
 def layout_of(dtype: np.dtype[Any]) -> tuple[Layout, int] | None:

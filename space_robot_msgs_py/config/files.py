@@ -65,9 +65,6 @@ def node_parameters(path: Path, node: str) -> Tree:
 
     They are below the keys ``/**``, the node's ROS name, or ``/**/`` and the name: ROS applies the
     latter in any namespace, the name alone only in the root namespace.
-
-    Raises:
-        InputError: the file cannot be read, or is not a ROS parameter file.
     """
     merged: Tree = {}
     for name, content in read_yaml(path).items():
@@ -94,11 +91,7 @@ def merge(below: Tree, above: Mapping[str, Any]) -> Tree:
 
 
 def nest(flat: Mapping[Any, Any]) -> Tree:
-    """Convert ``{"a.b": 1}`` to ``{"a": {"b": 1}}``.
-
-    Raises:
-        InputError: a key has a value and also a group of values.
-    """
+    """Convert ``{"a.b": 1}`` to ``{"a": {"b": 1}}``."""
     tree: Tree = {}
     for key, value in flat.items():
         head, _, rest = str(key).partition(".")

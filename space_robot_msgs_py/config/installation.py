@@ -22,11 +22,7 @@ _EXTRA = re.compile(r"extra\s*==\s*['\"]([\w-]+)['\"]")
 
 @cache
 def config_directory() -> Path:
-    """Return the ``config/`` folder of the source tree, or the one installed under ``share/``.
-
-    Raises:
-        InputError: the installation is incomplete.
-    """
+    """Return the ``config/`` folder of the source tree, or the one installed under ``share/``."""
     for parent in Path(__file__).resolve().parents:
         for folder in (parent / "config", parent / "share/space_robot/config"):
             if (folder / GRAPH_FILE).is_file():
@@ -40,7 +36,7 @@ def install_command(extra: str) -> str:
     It names them, as in ``pip install 'viser>=1.1'``: the project is on no index, so that ``pip
     install 'space_robot[view]'`` works only in its folder.
     """
-    packages = extra_packages(extra)
+    packages = requirements().get(extra)
     if not packages:
         return f"pip install -e '.[{extra}]' in the folder of space_robot"
     return install_packages(packages)
@@ -49,11 +45,6 @@ def install_command(extra: str) -> str:
 def install_packages(packages: Sequence[str]) -> str:
     """Return the command that installs packages, as ``viser>=1.1``."""
     return shlex.join(["pip", "install", *packages])
-
-
-def extra_packages(extra: str) -> list[str]:
-    """Return the requirements of an extra, as ``viser>=1.1``; none if nothing is installed."""
-    return requirements().get(extra, [])
 
 
 def requirements(lines: Sequence[str] | None = None) -> dict[str, list[str]]:

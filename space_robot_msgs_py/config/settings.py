@@ -79,11 +79,7 @@ class NodeSettings(StrictModel):
 
     @classmethod
     def resolve(cls, overrides: Mapping[str, Any]) -> Self:
-        """Read the settings from the files and the user's (dotted or nested) overrides.
-
-        Raises:
-            InputError: an invalid value; names the file or override.
-        """
+        """Read the settings from the files and the user's (dotted or nested) overrides."""
         where = f"{cls.node} parameters"
         own, tree = nest(overrides), Tree()
         base = node_parameters(config_directory() / GRAPH_FILE, cls.node)

@@ -77,8 +77,7 @@ def choices(name: str, allowed: Iterable[str], also: str = "", listing: str = ""
 
 
 def _shown(name: str) -> str:
-    text = printable(name[: LONGEST_SHOWN + 1])
-    return text if len(text) <= LONGEST_SHOWN else f"{text[: LONGEST_SHOWN - 3]}..."
+    return printable(shortened(name, LONGEST_SHOWN))
 
 
 def nearest(name: str, allowed: Sequence[str]) -> list[str]:
@@ -100,13 +99,7 @@ def nearest(name: str, allowed: Sequence[str]) -> list[str]:
 
 
 def html_table(heads: Sequence[str], rows: Iterable[Sequence[str]], caption: str = "") -> str:
-    """Return a table; cells that are numbers are aligned right, all others left.
-
-    Args:
-        heads: of the columns.
-        rows: texts, one per column.
-        caption: paragraph above the table; empty: none.
-    """
+    """Return a table below a caption; cells that are numbers are aligned right, all others left."""
     head = "".join(f"<th>{escape(text)}</th>" for text in heads)
     body = "".join(f"<tr>{''.join(map(_cell, row))}</tr>" for row in rows)
     above = f"<p>{escape(caption)}</p>" if caption else ""

@@ -25,6 +25,7 @@ class StrictModel(BaseModel):
     Only an integer may stand for a float, and a number for a name (``case: 1``).
     """
 
+    # built at first use: a command needs few of all schemas
     model_config = ConfigDict(
         extra="forbid", frozen=True, allow_inf_nan=False, strict=True, defer_build=True
     )
@@ -32,7 +33,7 @@ class StrictModel(BaseModel):
     @field_validator("*", mode="before")
     @classmethod
     def _meant(cls, value: Any, field: ValidationInfo) -> Any:
-        if isinstance(value, tuple):
+        if isinstance(value, tuple):  # in strict models no list
             return list(value)
         wanted = cls.model_fields[field.field_name or ""].annotation
         if wanted is str and isinstance(value, (int, float)) and not isinstance(value, bool):
@@ -73,7 +74,7 @@ def read_yaml(path: Path) -> dict[str, Any]:
 
 @lru_cache(maxsize=128)
 def _pickled(text: str) -> bytes:
-    """Return the pickled content of a text; cached, since parsing is slow and files are reused."""
+    # parsing is slow and files are read again and again; a pickle gives each reader its own copy
     return pickle.dumps(parse_yaml(text))
 
 
@@ -112,7 +113,6 @@ def one_line(error: ValidationError, schema: type[BaseModel], where: str) -> str
 
 
 def _field_at(schema: Any, location: tuple[int | str, ...]) -> tuple[Any, str]:
-    """Return the annotation and the description of the field at a location within ``schema``."""
     description = ""
     for step in location:
         fields = _fields(schema)
@@ -171,11 +171,7 @@ def one_of(
 
 
 def full_namespace(text: str) -> str:
-    """Return a namespace in ROS's form: ``/sat1`` for ``sat1`` or ``/sat1/``, ``/`` if empty.
-
-    Raises:
-        InputError: invalid namespace.
-    """
+    """Return a namespace in ROS's form: ``/sat1`` for ``sat1`` or ``/sat1/``, ``/`` if empty."""
     if not (name := text.strip("/")):
         return ROOT
     namespace = f"/{name}"

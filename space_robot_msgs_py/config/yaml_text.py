@@ -44,11 +44,7 @@ class YamlTextError(InputError):
 
 
 def read_file(path: Path) -> str:
-    """Read the text of a regular file; not of pipes and devices, which may be endless.
-
-    Raises:
-        InputError: the file does not exist, or cannot be read.
-    """
+    """Read the text of a regular file; not of pipes and devices, which may be endless."""
     with _opened(path) as file:
         data = file.read(LARGEST_FILE + 1)
         if len(data) > LARGEST_FILE:

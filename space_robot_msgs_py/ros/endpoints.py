@@ -13,6 +13,7 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 from rclpy.callback_groups import CallbackGroup
+from rclpy.duration import Duration
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.serialization import serialize_message
@@ -23,7 +24,7 @@ from .. import topics
 from ..errors import MessageError
 from ..topics import Topic
 from ..wire.definitions import decode
-from .rclpy_internals import SubscriptionWaitSet, raw_publish, take_serialized
+from .rclpy_internals import raw_publish, take_serialized
 
 
 class PolledCallbackGroup(CallbackGroup):
@@ -32,13 +33,6 @@ class PolledCallbackGroup(CallbackGroup):
     def can_execute(self, entity: Any) -> bool:
         """Allow none."""
         return False
-
-    def beginning_execution(self, entity: Any) -> bool:
-        """Allow none."""
-        return False
-
-    def ending_execution(self, entity: Any) -> None:
-        """Do nothing."""
 
 
 def full_name_of(info: TopicEndpointInfo) -> str:
@@ -97,27 +91,23 @@ class RawPublisher:
         nodes = [node for node, _, topic in awaited if topic.strip("/") in ("", self.topic.name)]
         infos = self._node.get_subscriptions_info_by_topic(self.topic.name)
         listening = {full_name_of(info) for info in infos}
-        missing = [name for name in nodes if self._full_node_name(name) not in listening]
+        here = self._node.get_namespace().rstrip("/")
+        missing = [
+            name
+            for name in nodes
+            if (name if name.startswith("/") else f"{here}/{name}") not in listening
+        ]
         if not missing and self.listener_count < len(nodes):
             return nodes  # discovered, but not all matched with this publisher yet
         return missing
 
-    def _full_node_name(self, name: str) -> str:
-        namespace = self._node.get_namespace().rstrip("/")
-        return name if name.startswith("/") else f"{namespace}/{name}"
-
-    def flush(self, timeout_s: float) -> None:
-        """Wait until all subscribers have acknowledged all sent messages."""
-        from rclpy.duration import Duration
-
-        self._publisher.wait_for_all_acked(Duration(seconds=timeout_s))
-
 
 def flush(outputs: Sequence[RawPublisher], timeout_s: float) -> None:
-    """Call `RawPublisher.flush` of all publishers, with a common ``timeout_s``."""
+    """Wait until all subscribers have acknowledged all messages sent by some publishers."""
     until = time.monotonic() + timeout_s
     for output in outputs:
-        output.flush(max(0.0, until - time.monotonic()))
+        left_s = max(0.0, until - time.monotonic())
+        output._publisher.wait_for_all_acked(Duration(seconds=left_s))
 
 
 NOT_COUNTED = (1 << 64) - 1
@@ -145,14 +135,9 @@ class RawSubscription:
         depth: int = 0,
         best_effort: bool = False,
     ) -> None:
-        """Subscribe.
+        """Subscribe, with the topic's own depth if ``depth`` is 0.
 
-        Args:
-            node: that subscribes.
-            topic: name, type and quality of service.
-            group: callback group that excludes it from executors.
-            depth: of the queue (0: that of the topic).
-            best_effort: True for best effort, so that the publisher never waits or resends.
+        With ``best_effort`` the publisher never waits or resends.
         """
         self.topic, self._node = topic, node
         profile = qos(topic)
@@ -162,7 +147,7 @@ class RawSubscription:
         self._subscription = node.create_subscription(
             message_type(topic.type),
             topic.name,
-            lambda message: None,
+            lambda message: None,  # never called: the loop takes messages itself
             profile,
             raw=True,
             callback_group=group,
@@ -189,22 +174,6 @@ class RawSubscription:
         data, info = taken
         sequence = info["publication_sequence_number"]
         return Received(data, info["source_timestamp"], 0 if sequence == NOT_COUNTED else sequence)
-
-
-class Waiter:
-    """Waits until one of some subscriptions has a message."""
-
-    def __init__(self, node: Node) -> None:
-        """Create the waiter; ``node`` is any node of the process."""
-        self._context = node.context
-        self._sets: dict[int, SubscriptionWaitSet] = {}
-
-    def wait(self, inputs: Sequence[RawSubscription], timeout_s: float) -> None:
-        """Sleep until there is a message, or until the timeout."""
-        size = len(inputs)
-        if size not in self._sets:
-            self._sets[size] = SubscriptionWaitSet(self._context, size)
-        self._sets[size].wait([entry.handle for entry in inputs], timeout_s)
 
 
 # /simulation/paused tells all nodes of a pause, so that watchdogs ignore it.

@@ -96,11 +96,9 @@ def nodes_in(domain: int, namespace: str = ROOT) -> list[Holder]:
 
 
 def living_nodes(name: str, namespace: str = "") -> Iterator[tuple[int, str]]:
-    """Yield domain and namespace of this machine's nodes with a name, the newest first.
+    """Yield domain and namespace of this machine's nodes, the newest first.
 
-    Args:
-        name: of the node, without namespace.
-        namespace: of the node; empty: any.
+    Nodes have the ``name`` (without namespace) and the ``namespace``; empty: any.
     """
     start, end = _path("").stem, f".{name}.lock"
     files = _path("").parent.glob(f"{start}*@*{end}")
@@ -109,11 +107,6 @@ def living_nodes(name: str, namespace: str = "") -> Iterator[tuple[int, str]]:
         own_namespace = dotted.replace(".", "/") or ROOT
         if domain.isdecimal() and namespace in ("", own_namespace) and is_held(path):
             yield int(domain), own_namespace
-
-
-def newest_node(name: str, namespace: str = "") -> tuple[int, str] | None:
-    """Return the first of `living_nodes`; None if there is none."""
-    return next(living_nodes(name, namespace), None)
 
 
 def _holders(paths: Iterable[Path]) -> list[Holder]:
@@ -149,7 +142,7 @@ def _holder(descriptor: int) -> Holder:
 
 
 def _open(path: Path) -> int:
-    """Open a lock file for all users, since a domain is shared by the whole machine."""
+    # for all users: the whole machine shares a domain
     flags = os.O_RDWR | os.O_NOFOLLOW
     try:
         if path.exists():  # Linux refuses O_CREAT for other users' files in /tmp

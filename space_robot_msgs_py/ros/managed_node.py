@@ -108,11 +108,7 @@ class ManagedNode(LifecycleNode, Generic[Schema]):
         return Health(health.mode, health.level, values)
 
     def claim_name(self) -> None:
-        """Claim the node's name, so that service calls by name reach one node only.
-
-        Raises:
-            InputError: another node of this project in the domain has it.
-        """
+        """Claim the node's name, so that service calls by name reach one node only."""
         domain, name = self.context.get_domain_id(), self.get_fully_qualified_name()
         try:
             self._name = FileLock(node_lock(domain, name), self.get_name())
@@ -166,11 +162,7 @@ class ManagedNode(LifecycleNode, Generic[Schema]):
             raise self.error or SpaceRobotError(f"{self.get_name()} cannot be started")
 
     def end(self) -> None:
-        """Shut down, unless already done, and release all resources.
-
-        Raises:
-            SpaceRobotError: the loop could not be closed properly.
-        """
+        """Shut down, unless already done, and release all resources."""
         if self.is_shut_down:
             self._try(self._release)
         else:
@@ -196,7 +188,7 @@ class ManagedNode(LifecycleNode, Generic[Schema]):
         return self._try(configure, undo=self._release)
 
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Start the loop."""
+        """Let the scheduler start the loop, once its subscribers are there."""
         self.is_active = True
         return TransitionCallbackReturn.SUCCESS
 
@@ -253,6 +245,7 @@ class ManagedNode(LifecycleNode, Generic[Schema]):
             if loop is not None:
                 loop.close()
         finally:
+            # all that was created since the constructor: the next configuration creates it anew
             publishers, subscriptions, parameters = self._entities()
             for publisher in publishers - self._own[0]:
                 self.destroy_publisher(publisher)

@@ -11,9 +11,9 @@ from operator import attrgetter
 from pathlib import Path
 from typing import Any
 
-from .endpoints import Waiter
 from .loop import Loop, Wait
 from .managed_node import ManagedNode
+from .rclpy_internals import SubscriptionWaiter
 
 SPIN_S = 300e-6
 """Time of polling and yielding before sleeping in the wait set. Not under SCHED_FIFO, where
@@ -50,11 +50,7 @@ class Upkeep:
         return min(self._next_call, self._next_report)
 
     def run(self, timeout_s: float = 0.0) -> None:
-        """Execute a waiting service call or report the health, if due.
-
-        Args:
-            timeout_s: time to wait for a call; only without flight.
-        """
+        """Execute a service call or report the health, if due; only idle nodes wait for calls."""
         now = time.monotonic()
         serves_calls = timeout_s > 0.0 or self._next_call <= min(now, self._next_report)
         if serves_calls:
@@ -78,7 +74,7 @@ class NodeScheduler:
         self._scheduled = [ScheduledNode(node, is_alone=len(nodes) == 1) for node in nodes]
         self._upkeeps = [Upkeep(node) for node in nodes]
         self._upkeep_at = 0.0
-        self._waiter = Waiter(nodes[0])
+        self._waiter = SubscriptionWaiter(nodes[0].context)
         self._is_alone = len(nodes) == 1
         for scheduled in self._scheduled if not self._is_alone else []:
             scheduled.node.let_others_work = partial(self._step_others, scheduled)
@@ -100,7 +96,6 @@ class NodeScheduler:
         return self._rest(now) if is_idle else True
 
     def _serve_inactive(self) -> bool:
-        """Wait for service calls while no node is active; return False when all are shut down."""
         timeout_s = PERIOD_S / len(self._nodes)
         for upkeep in self._upkeeps:
             upkeep.run(timeout_s)
@@ -112,7 +107,6 @@ class NodeScheduler:
         self._upkeep_at = max(due, time.monotonic() + UPKEEP_GAP_S)
 
     def _rest(self, now: float) -> bool:
-        """Run due upkeep, or wait until a node has work; return False at the end."""
         if now >= self._upkeep_at:
             self._serve_one()
             return True
@@ -124,8 +118,8 @@ class NodeScheduler:
             for scheduled in active:
                 scheduled.step_at = min(scheduled.step_at, scheduled.wake_at)
             return True
-        if inputs := [entry for scheduled in active for entry in scheduled.wait.inputs]:
-            self._waiter.wait(inputs, left)
+        if handles := [entry.handle for node in active for entry in node.wait.inputs]:
+            self._waiter.wait(handles, left)
             for scheduled in active:
                 scheduled.step_at = 0.0
         else:

@@ -16,17 +16,12 @@ from .rclpy_internals import declared_parameters, parameter_overrides
 Schema = TypeVar("Schema", bound=NodeSettings)
 
 
-def _bounds(field: Any) -> tuple[float | None, float | None]:
+def descriptor(field: Any, read_only: bool) -> ParameterDescriptor:
+    """Return the ROS descriptor of a schema's field: description and range."""
     low = high = None
     for item in field.metadata:
         low = next((getattr(item, k) for k in ("ge", "gt") if hasattr(item, k)), low)
         high = next((getattr(item, k) for k in ("le", "lt") if hasattr(item, k)), high)
-    return low, high
-
-
-def descriptor(field: Any, read_only: bool) -> ParameterDescriptor:
-    """Return the ROS descriptor of a schema's field: description and range."""
-    low, high = _bounds(field)
     result = ParameterDescriptor(description=field.description or "", read_only=read_only)
     if low is not None and high is not None:
         if field.annotation is int:
@@ -43,9 +38,6 @@ def declare_settings(node: Node, schema: type[Schema], changeable: tuple[str, ..
 
     All are read-only except the ``changeable`` ones. The schema checks types and ranges first, with
     clearer messages than ROS.
-
-    Raises:
-        InputError: an invalid file or parameter.
     """
     fields = dict(leaves(schema))
     own = overrides(node)
@@ -55,6 +47,7 @@ def declare_settings(node: Node, schema: type[Schema], changeable: tuple[str, ..
         node.get_logger().info(
             f"a tick lasts {settings.period:g} s; the shipped gains are for {usual:g} s"
         )
+    # the overrides are in these values already
     for name, value in flatten(settings.model_dump()):
         node.declare_parameter(
             name, value, descriptor(fields[name], name not in changeable), ignore_override=True
@@ -74,11 +67,7 @@ def overrides(node: Node) -> dict[str, Any]:
 
 
 def refuse_unknown(node: Node) -> None:
-    """Refuse undeclared parameters, which ROS would ignore silently.
-
-    Raises:
-        InputError: an unknown parameter; lists the existing ones.
-    """
+    """Refuse undeclared parameters, which ROS would ignore silently."""
     allowed = sorted(declared_parameters(node))
     for name in overrides(node):
         if name not in allowed:
@@ -89,4 +78,5 @@ def refuse_unknown(node: Node) -> None:
 
 
 def _plain(value: Any) -> Any:
+    # rclpy has lists of numbers as array.array
     return list(value) if hasattr(value, "typecode") else value

@@ -32,20 +32,25 @@ def raw_publish(publisher: Publisher) -> Callable[[bytes], None]:
     return publish
 
 
-class SubscriptionWaitSet:
-    """A wait set for a fixed number of subscriptions."""
+class SubscriptionWaiter:
+    """Waits until one of some subscriptions of a process has a message."""
 
-    def __init__(self, context: Context, size: int) -> None:
-        handle: Any = context.handle
-        with handle:
-            self._set = _rclpy.WaitSet(size, 0, 0, 0, 0, 0, handle)
+    def __init__(self, context: Context) -> None:
+        self._context: Any = context
+        self._sets: dict[int, Any] = {}
 
     def wait(self, handles: Sequence[Any], timeout_s: float) -> None:
-        """Sleep until one of the subscriptions has a message, or until the timeout."""
-        self._set.clear_entities()
+        """Sleep until there is a message for one of the handles, or until the timeout."""
+        size = len(handles)
+        if size not in self._sets:  # a wait set has room for a fixed number
+            handle = self._context.handle
+            with handle:
+                self._sets[size] = _rclpy.WaitSet(size, 0, 0, 0, 0, 0, handle)
+        waiting = self._sets[size]
+        waiting.clear_entities()
         for handle in handles:
-            self._set.add_subscription(handle)
-        self._set.wait(max(1, int(timeout_s * 1e9)))
+            waiting.add_subscription(handle)
+        waiting.wait(max(1, int(timeout_s * 1e9)))
 
 
 class ServiceWaitSet:
@@ -108,9 +113,7 @@ def forget_parameters(node: Node, names: Iterable[str]) -> None:
 def guard_change_state(node: LifecycleNode, refused: Callable[[], None]) -> None:
     """Refuse transitions that do not exist in the present state, on which rclpy would crash.
 
-    Args:
-        node: not in an executor yet.
-        refused: called for each such transition.
+    ``refused`` is called for each. To be called before the node is in an executor.
     """
     service = node._service_change_state
     change_state = service.callback

@@ -91,16 +91,12 @@ def until(condition: Callable[[], bool]) -> Generator[None, None, None]:
 
 
 async def change_state(node: Node, name: str, transition: str) -> None:
-    """Request a lifecycle transition of another node, from within a service callback.
-
-    Args:
-        node: that asks.
-        name: of the other node in its namespace.
-        transition: ``configure``, ``activate``, ``deactivate`` or ``cleanup``.
+    """Request a lifecycle transition of the node ``name``, from within a service callback.
 
     Raises:
         FlightError: the other node refuses or does not answer.
     """
+    # the answer comes while the callback that waits for it has not returned
     client = node.create_client(
         ChangeState, f"{name}/change_state", callback_group=ReentrantCallbackGroup()
     )

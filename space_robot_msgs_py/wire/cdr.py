@@ -24,7 +24,7 @@ from .definitions import jazzy
 
 Bytes = NDArray[np.uint8]
 
-ENCAPSULATION = b"\x00\x01\x00\x00"
+ENCAPSULATION = b"\x00\x01\x00\x00"  # little endian, no options
 BODY = len(ENCAPSULATION)
 BIG_ENDIAN = b"\x00\x00"
 """First bytes of a big-endian message."""
@@ -33,22 +33,12 @@ _BIG_STAMP = struct.Struct(">iI")
 TIME = "builtin_interfaces/msg/Time"
 _PRIMITIVES = {
     name: struct.Struct(f"<{letter}")
-    for name, letter in {
-        "bool": "?",
-        "byte": "B",
-        "octet": "B",
-        "char": "B",
-        "uint8": "B",
-        "int8": "b",
-        "uint16": "H",
-        "int16": "h",
-        "uint32": "I",
-        "int32": "i",
-        "uint64": "Q",
-        "int64": "q",
-        "float32": "f",
-        "float64": "d",
-    }.items()
+    for letter, names in (
+        *(("?", "bool"), ("B", "byte octet char uint8"), ("b", "int8"), ("H", "uint16")),
+        *(("h", "int16"), ("I", "uint32"), ("i", "int32"), ("Q", "uint64"), ("q", "int64")),
+        *(("f", "float32"), ("d", "float64")),
+    )
+    for name in names.split()
 }
 _LENGTH = _PRIMITIVES["uint32"]
 _NUMBER = (Nodetype.BASE, ("float64", 0))
@@ -97,8 +87,6 @@ class MessageLayout:
 
 
 class _Walk:
-    """Writes the fields of a message in the order of its definition."""
-
     def __init__(self) -> None:
         self.body = bytearray()
         self.changing: list[tuple[int, int]] = []
@@ -174,11 +162,7 @@ def _value(content: Any, name: str) -> Any:
 
 
 def header_stamp_ns(data: bytes, at: int = 0) -> int:
-    """Return the stamp, ns, of a serialized message that starts with a Header or a Time.
-
-    Args:
-        data: the message, little or big endian.
-        at: number of bytes before the stamp.
+    """Return the stamp, ns, of a message whose Header or Time stands behind ``at`` bytes.
 
     Raises:
         MessageError: the message is too short.

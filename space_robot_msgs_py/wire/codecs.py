@@ -50,7 +50,6 @@ def stamp_of(data: Any) -> int:
 
 @subroutine
 def _store(data: Bytes, at: Any, value: Any, size: int) -> None:
-    """Store an integer of ``size`` bytes, little endian."""
     for i in range(size):
         data[at + np.uint64(i)] = np.uint8(value >> np.uint64(8 * i) & np.uint64(0xFF))
 
@@ -129,11 +128,7 @@ class CompiledCodec:
         return self._wire.tobytes()
 
     def decode(self, data: bytes, values: Array) -> int:
-        """Read a message into a sample's numbers; return its stamp, ns.
-
-        Raises:
-            MessageError: the bytes are not a message of this topic and robot.
-        """
+        """Read a message into a sample's numbers; return its stamp, ns."""
         stamp_ns = self.read(data, values)
         if stamp_ns == FOREIGN:
             layout = self._description.learn(data)
@@ -147,17 +142,13 @@ class CompiledCodec:
 
 
 def _indices(description: MessageDescription, record: np.dtype[Any] | None) -> Offsets:
-    """Return the indices of the columns' numbers in a sample."""
-    fields = record.fields if record is not None else None
-    if fields is None:
-        return np.arange(sum(column.length for column in description.columns), dtype=np.uint64)
-    firsts = [fields[name][1] // 8 + first for name, first, _ in description.columns]
-    runs = [
-        np.arange(first, first + column.length)
-        for first, column in zip(firsts, description.columns, strict=True)
-    ]
-    indices: Offsets = np.concatenate(runs).astype(np.uint64)
-    return indices
+    if record is None or record.fields is None:
+        return np.arange(description.width, dtype=np.uint64)
+    starts = [record.fields[name][1] // 8 + first for name, first, _ in description.columns]
+    lengths = [column.length for column in description.columns]
+    return np.concatenate(
+        [np.arange(a, a + k, dtype=np.uint64) for a, k in zip(starts, lengths, strict=True)]
+    )
 
 
 class StateCodec:
@@ -182,11 +173,7 @@ class StateCodec:
         return tuple([codec.encode(stamp_ns, numbers) for codec in self.parts.values()])
 
     def decode(self, topic: Topic, data: bytes, state: RobotState) -> int:
-        """Write one message into ``state``; return its tick.
-
-        Raises:
-            MessageError: the message does not fit.
-        """
+        """Write one message into ``state``; return its tick."""
         return self._timebase.tick(self.parts[topic].decode(data, state.numbers))
 
 
@@ -203,9 +190,5 @@ class CommandCodec:
         return self._codec.encode(self._timebase.stamp_ns(command.tick), command.torque)
 
     def decode(self, data: bytes, command: Command) -> None:
-        """Write a message into ``command``.
-
-        Raises:
-            MessageError: the message does not fit.
-        """
+        """Write a message into ``command``."""
         command.tick = self._timebase.tick(self._codec.decode(data, command.torque))

@@ -154,7 +154,6 @@ class MessageDescription:
             yield from self._runs_of_part(point, order, f"points[{i}].")
 
     def _runs_of_part(self, part: Any, order: list[int], prefix: str) -> Iterator[Run]:
-        """Yield the numbers of a message, or of a point in it."""
         for path, columns in self.fields.items():
             values, _, is_of_body = path.partition("[")
             count = len(getattr(part, values)) if path in ROWS or is_of_body else 1
@@ -175,11 +174,7 @@ class MessageDescription:
         return self.learn(MessageLayout(self.topic.type, self.content(rows)).data)
 
     def learn(self, data: bytes) -> Numbers:
-        """Return the layout of any message of the topic.
-
-        Raises:
-            MessageError: the bytes are not a message of this topic and robot.
-        """
+        """Return the layout of any message of the topic."""
         message = decode(data, self.topic.type)
         runs = list(self.runs(message))
         layout = MessageLayout(self.topic.type, message)
@@ -225,14 +220,28 @@ def describe(
 
 
 def name_order(names: Sequence[str], expected: Sequence[str], topic: str) -> list[int]:
-    """Return the index of each expected name in ``names``.
-
-    Raises:
-        MessageError: the names are not the expected ones.
-    """
+    """Return the index of each expected name in ``names``."""
     if sorted(names) != sorted(expected):
         raise MessageError(f"{topic}: names {list(names)}, expected {list(expected)}", "names")
     return [list(names).index(name) for name in expected]
+
+
+class WritableMessage:
+    """A message whose numbers and stamps are overwritten again and again."""
+
+    def __init__(self, numbers: Numbers, stamps: Sequence[int]) -> None:
+        """Lay out the message; ``stamps`` are the offsets of those to be written, bytes."""
+        room = np.zeros(BODY + numbers.layout.pattern.shape[1], np.uint8)
+        self._wire = room[BODY:]  # aligns the float64 in memory
+        self._wire[:] = numbers.layout.pattern[0]
+        self._body, self.words, self._stamps = body(self._wire), numbers.words, stamps
+
+    def serialized(self, stamp_ns: int, values: Array) -> bytes:
+        """Return the message with these numbers, and this time in all its stamps."""
+        self._body[self.words] = values
+        for offset in self._stamps:
+            STAMP.pack_into(self._wire.data, offset, *divmod(stamp_ns, 1_000_000_000))
+        return self._wire.tobytes()
 
 
 class Codec:
@@ -248,30 +257,18 @@ class Codec:
         self._write_like(description.own())
 
     def _write_like(self, own: Numbers) -> None:
-        room = np.zeros(BODY + own.layout.pattern.shape[1], np.uint8)
-        self._wire = room[BODY:]  # aligns the float64 in memory
-        self._wire[:] = own.layout.pattern[0]
-        self._body = body(self._wire)
-        self._to = own.words
+        self._message = WritableMessage(own, (BODY,) if self._description.topic.has_stamp else ())
         self._read_like(own)
 
     def _read_like(self, known: Numbers) -> None:
         self._pattern = known.layout.pattern
         self._from = known.words
 
-    def encode(self, stamp_ns: int | None, values: Array) -> bytes:
-        """Return the serialized message of some numbers.
-
-        Args:
-            stamp_ns: its stamp (None: without stamp).
-            values: all rows, flattened.
-        """
-        if values.size != self._to.size:
+    def encode(self, stamp_ns: int, values: Array) -> bytes:
+        """Return the serialized message of all rows, flattened; its topic may have no stamp."""
+        if values.size != self._message.words.size:
             self._write_like(self._description.own(values.size // self._description.width))
-        self._body[self._to] = values
-        if stamp_ns is not None:
-            STAMP.pack_into(self._wire.data, BODY, *divmod(stamp_ns, 1_000_000_000))
-        return self._wire.tobytes()
+        return self._message.serialized(stamp_ns, values)
 
     def decode(self, data: bytes) -> tuple[int, Array]:
         """Return the stamp, ns, and the numbers of all rows, flattened, of a message of the topic.

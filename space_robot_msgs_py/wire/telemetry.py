@@ -50,20 +50,12 @@ class ReferenceCodec:
         return self._joints.encode(stamp_ns, joints), self._base.encode(stamp_ns, base)
 
     def decode_joints(self, data: bytes) -> tuple[int, Array]:
-        """Return first tick and rows (k, 3, n) of a /reference/joints.
-
-        Raises:
-            MessageError: other joints than expected, or points not one tick apart.
-        """
+        """Return first tick and rows (k, 3, n) of a /reference/joints."""
         stamp_ns, values = self._joints.decode(data)
         return self._timebase.tick(stamp_ns), values.reshape(-1, 3, self._n)
 
     def decode_base(self, data: bytes) -> tuple[int, Array]:
-        """Return first tick and rows (k, 10) of a /reference/base.
-
-        Raises:
-            MessageError: points not one tick apart.
-        """
+        """Return first tick and rows (k, 10) of a /reference/base."""
         stamp_ns, values = self._base.decode(data)
         return self._timebase.tick(stamp_ns), values.reshape(-1, 10)
 
@@ -117,15 +109,11 @@ class TelemetryCodec:
         self._numbers[0] = tick
         for target, row in zip(self._rows, rows, strict=True):
             target[:] = row
-        return self._codec.encode(None, self._numbers)
+        return self._codec.encode(0, self._numbers)
 
     @staticmethod
     def decode(data: bytes) -> tuple[int, Array]:
-        """Return tick and rows (4, n+3).
-
-        Raises:
-            MessageError: the message does not fit.
-        """
+        """Return tick and rows (4, n+3)."""
         message = decode(data, topics.TELEMETRY.type)
         offset, shape = message.layout.data_offset, [dim.size for dim in message.layout.dim]
         try:

@@ -1,4 +1,4 @@
-"""Messages for viewers and for others' nodes: frames, shapes, the base, the robot's URDF."""
+"""Messages for viewers and other nodes: frames, shapes, the base, the robot's URDF."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from .. import topics
 from ..samples import Timebase
 from ..topics import Topic
-from .cdr import BODY, ENCAPSULATION, STAMP, MessageLayout
-from .messages import body
+from .cdr import ENCAPSULATION, MessageLayout
+from .messages import Numbers, WritableMessage
 
 Array = NDArray[np.float64]
 
@@ -24,7 +24,7 @@ CUBE, SPHERE, CYLINDER, MESH = 1, 2, 3, 10
 DELETE_ALL = 3
 """Action of visualization_msgs/Marker that deletes all; adding is 0."""
 UNKNOWN = [-1.0, *[0.0] * 8]
-"""Covariance of what a sensor_msgs/Imu does not tell."""
+"""Covariance of a quantity that a sensor_msgs/Imu lacks."""
 _CARRIER = struct.Struct("<4sIII")
 """Encapsulation header, no dimensions, no offset, length of the data."""
 
@@ -39,31 +39,19 @@ class NumbersCodec:
         runs: Sequence[tuple[str, int]],
         timebase: Timebase,
     ) -> None:
-        """Compute the layout of the message.
+        """Compute the layout of the message with the constant fields ``content``.
 
-        Args:
-            type_name: type of the message.
-            content: its constant fields.
-            runs: path of the first of some consecutive numbers, such as ``pose.position``, and how
-                many they are.
-            timebase: conversion between ticks and stamps.
+        ``runs``: path of the first of some consecutive numbers, such as ``pose.position``, and how
+        many they are.
         """
-        self._timebase = timebase
-        layout = MessageLayout(type_name, content)
-        self._wire = np.zeros(BODY + layout.pattern.shape[1], np.uint8)[BODY:]
-        self._wire[:] = layout.pattern[0]
-        self._body = body(self._wire)
-        starts = [((layout.slots[path].offset - BODY) // 8, count) for path, count in runs]
-        self._at = np.array([start + k for start, count in starts for k in range(count)], np.intp)
-        self._stamps = layout.stamps
+        self._timebase, layout = timebase, MessageLayout(type_name, content)
+        offsets = [layout.slots[path].offset + 8 * k for path, count in runs for k in range(count)]
+        numbers = Numbers(layout, np.array(offsets, np.uint64))
+        self._message = WritableMessage(numbers, layout.stamps)
 
     def encode(self, tick: int, numbers: Array) -> bytes:
         """Return the message of a tick, from its numbers in the order of the runs."""
-        self._body[self._at] = numbers.reshape(-1)
-        stamp = divmod(self._timebase.stamp_ns(tick), 1_000_000_000)
-        for place in self._stamps:
-            STAMP.pack_into(self._wire.data, place, *stamp)
-        return self._wire.tobytes()
+        return self._message.serialized(self._timebase.stamp_ns(tick), numbers.reshape(-1))
 
 
 class FramePair(NamedTuple):

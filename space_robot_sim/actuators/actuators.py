@@ -29,7 +29,7 @@ from space_robot_msgs_py.compiled.kernels import kernel
 from space_robot_msgs_py.compiled.lanes import uniform, whole
 from space_robot_msgs_py.compiled.records import nested, shaped
 from space_robot_msgs_py.errors import InputError
-from space_robot_msgs_py.samples import MOST_THRUSTERS, MOST_TORQUERS, MOST_WHEELS, State
+from space_robot_msgs_py.samples import MOST_ACTUATORS, State
 
 from ..component import Component, Installation
 from ..faults.schedule import Schedule
@@ -70,8 +70,7 @@ class ActuatorSettings(BaseActuatorSettings, DriveSettings):
 
 
 def _latency(settings: ActuatorSettings, at: Installation) -> Array:
-    numbers = at.n + 3 + MOST_WHEELS + MOST_THRUSTERS + MOST_TORQUERS
-    latency = np.full(numbers, float(settings.command_latency_ticks))
+    latency = np.full(at.n + 3 + MOST_ACTUATORS, float(settings.command_latency_ticks))
     if settings.thruster_count:
         first = at.n + 3 + settings.wheel_count
         delays = settings.thrusters.ticks("delay", at.period)
@@ -94,24 +93,16 @@ class Actuators(Component):
     """1 if the base receives the commanded torque; 0 if it has hardware or no actuators."""
     saturated_ticks: float = shaped(lambda n: ())
     """Number of ticks in which a torque was at its limit."""
-    latency: Array = shaped(
-        lambda n: (n + 3 + MOST_WHEELS + MOST_THRUSTERS + MOST_TORQUERS,),
-        uniform=True,
-        source=_latency,
-    )
+    latency: Array = shaped(lambda n: (n + 3 + MOST_ACTUATORS,), uniform=True, source=_latency)
     """Ticks by which each number of a command is late."""
-    due: Array = shaped(lambda n: (n + 3 + MOST_WHEELS + MOST_THRUSTERS + MOST_TORQUERS,))
+    due: Array = shaped(lambda n: (n + 3 + MOST_ACTUATORS,))
     """The command due at the current tick."""
     base_wrench: Array = shaped(lambda n: (6,))
     """Force, N, and torque, N m, on base axes, of all that acts on the base but the wheels."""
 
 
 def check_faults(schedule: Schedule, settings: BaseActuatorSettings) -> None:
-    """Check that the actuators of a base can have the faults of a flight.
-
-    Raises:
-        InputError: a fault limits the torque of a base that is not ideal.
-    """
+    """Check that the actuators of a base can have the faults of a flight."""
     if settings.base_actuation != "ideal" and schedule.of("saturate_base"):
         raise InputError(
             f"fault saturate_base is for base_actuation ideal, got "
@@ -127,6 +118,7 @@ def reports_given(actuators: Actuators) -> bool:
 
 def command_delay_buffer(actuators: Actuators, names: int) -> Array:
     """Return the ring buffer (ticks, names) of commands in transit, filled with zeros."""
+    # a command that is due at once needs no row
     longest = int(actuators.latency[:names].max(initial=0.0))
     return np.zeros((longest + 1 if longest else 0, names))
 
@@ -161,6 +153,7 @@ def actuate(
     reported[:] = due[: reported.size]
     if uniform(actuators.base_is_ideal) == 0.0:
         reported[:3] = 0.0
+    # the echo of a command is that within its limits, before the errors of the drives
     saturated = limit_torque(actuators.torque_limit, reported)
     drive_torque(actuators.drive, reported, applied)
     if uniform(actuators.base_is_ideal) == 0.0:

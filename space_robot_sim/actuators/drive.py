@@ -97,12 +97,10 @@ def limit_torque(limits: TorqueLimit, torque: Array) -> float:
 
 
 def lag_decays(lag: float, period: float) -> tuple[float, float]:
-    """Return ``exp(-T / tau)`` and its mean over the tick, for a lag ``tau`` and a period, s.
-
-    They are rounded from decimal arithmetic, which is the same on every machine.
-    """
+    """Return ``exp(-T / tau)`` and its mean over the tick, for a lag ``tau`` and a period, s."""
     if lag == 0.0:
         return 0.0, 0.0
+    # decimal arithmetic is the same on every machine, the C library's exp is not
     ratio = Decimal(period) / Decimal(lag)
     decay = (-ratio).exp()
     return float(decay), float((1 - decay) / ratio)
@@ -167,6 +165,7 @@ def drive_torque(drive: Drive, asked: Array, applied: Array) -> None:
         u = in_steps(asked[i], drive.step[i])
         u = where(abs(u) < drive.dead_band[i], 0.0, u)
         if any_lane(mean_decay > 0.0):
+            # the mean over the tick is given, y_1 is where the next tick begins
             behind = drive.lagging[i] - u
             drive.lagging[i] = where(mean_decay > 0.0, u + behind * drive.decay[i], 0.0)
             u = where(mean_decay > 0.0, u + behind * mean_decay, u)

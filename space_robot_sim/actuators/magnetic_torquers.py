@@ -35,21 +35,19 @@ class MagneticTorquers(Component):
 def magnetise(
     torquers: MagneticTorquers, asked: Array, magnetic_field: Array, base_wrench: Array
 ) -> None:
-    """Add the torque of the dipoles over a tick to ``base_wrench``.
+    """Add the torque of the dipoles (M,) asked for, A m2, over a tick to ``base_wrench``.
 
-    Args:
-        torquers: of the base.
-        asked: (M,) or more, dipole asked of each, A m2.
-        magnetic_field: (3,) T, base axes, at the begin of the tick.
-        base_wrench: (6,) force, N, and torque about the CoM, N m, on base axes.
+    The ``magnetic_field`` is that at the begin of the tick, T, base axes.
     """
     x, y, z = 0.0, 0.0, 0.0
     for k in range(whole(torquers.count)):
         most = torquers.max_dipole[k]
+        # a command that is not a number asks for nothing
         dipole = where(np.isnan(asked[k]), 0.0, max(min(asked[k], most), -most))
         x += dipole * torquers.axis[k, 0]
         y += dipole * torquers.axis[k, 1]
         z += dipole * torquers.axis[k, 2]
+    # torque m x B
     base_wrench[3] += y * magnetic_field[2] - z * magnetic_field[1]
     base_wrench[4] += z * magnetic_field[0] - x * magnetic_field[2]
     base_wrench[5] += x * magnetic_field[1] - y * magnetic_field[0]

@@ -22,7 +22,7 @@ from ..faults.grammar import About, Argument, Kind, switch_on
 
 Array = NDArray[np.float64]
 
-ONE = Argument(about=About.THRUSTER)
+VALVE = Argument(about=About.THRUSTER)
 
 
 class Thrusters(Component):
@@ -60,8 +60,10 @@ class Thrusters(Component):
     """Propellant used so far, kg."""
 
     FAULTS: ClassVar[tuple[Kind, ...]] = (
-        Kind("thruster_stuck_on", ONE, "a thruster's valve stays open", "stuck_on", switch_on),
-        Kind("thruster_stuck_off", ONE, "a thruster's valve stays closed", "stuck_off", switch_on),
+        Kind("thruster_stuck_on", VALVE, "a thruster's valve stays open", "stuck_on", switch_on),
+        Kind(
+            "thruster_stuck_off", VALVE, "a thruster's valve stays closed", "stuck_off", switch_on
+        ),
     )
 
 
@@ -80,6 +82,7 @@ def fire(
     """
     flow = 0.0
     for k in range(whole(thrusters.count)):
+        # the command is a force, a valve is open or closed: more than half of it opens
         wanted = (asked[k] > 0.5 * thrusters.force[k]) | (thrusters.remaining[k] > 0.0)
         is_open = (wanted | (thrusters.stuck_on[k] != 0.0)) & (thrusters.stuck_off[k] == 0.0)
         opens = is_open & (thrusters.open[k] == 0.0)
@@ -88,6 +91,7 @@ def fire(
         thrusters.remaining[k] = where(is_open & (left > 0.0), left, 0.0)
         thrusters.open[k] = where(is_open, 1.0, 0.0)
         flow += thrusters.open[k] * thrusters.flow[k]
+    # in the tick in which the tank runs empty the open thrusters share the rest
     burnt = min(flow * period, thrusters.propellant)
     share = where(flow > 0.0, burnt / where(flow > 0.0, flow * period, 1.0), 0.0)
     thrusters.burnt += burnt

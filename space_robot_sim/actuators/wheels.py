@@ -87,9 +87,11 @@ def drive_wheels(
         upper = min(wheels.max_torque[k], max(0.0, limit - momentum) / period)
         lower = -min(wheels.max_torque[k], max(0.0, limit + momentum) / period)
         torque = min(max(asked[k], lower), upper)
+        # only in the sense of the command: a full wheel can be slowed down
         at_limit = where(asked[k] > 0.0, asked[k] >= upper, asked[k] <= lower)
         works = wheels.failed[k] == 0.0
         saturated = where(at_limit & (asked[k] != 0.0) & works, 1.0, 0.0)
+        # without motor the wheel turns freely; its friction is the dynamics'
         torque = where(works, torque, 0.0)
         wheels.saturated[k] = saturated
         wheels.saturated_ticks[k] += saturated

@@ -17,7 +17,7 @@ from space_robot_msgs_py.simulated_time import tick_from
 
 from .events import Capture, Event, in_order
 from .impact import Grasp, Impact
-from .neighbouring_orbit import Meeting, meet
+from .neighbouring_orbit import TargetState, target_state
 from .orbit import OrbitSettings
 from .target import TargetMotion
 
@@ -33,8 +33,8 @@ class CaptureEvent(NamedTuple):
     after: Robot
     grasp: Grasp
     """Grasp of the target that is captured or released."""
-    meeting: Meeting | None = None
-    """Where a target on a neighbouring orbit is then."""
+    target_state: TargetState | None = None
+    """Of a target on a neighbouring orbit."""
 
     def impact(
         self, quaternion: Array, joint_positions: Array, wheel_axes: Array, wheel_inertia: Array
@@ -57,13 +57,13 @@ class CaptureEvent(NamedTuple):
 
     def miss(self, impact: Impact, base_position: Array) -> float:
         """Return by how much the tool misses the target, m; 0 if it reaches it."""
-        if self.meeting is None:
+        if self.target_state is None:
             return 0.0
-        distance = norm(base_position + impact.place - self.meeting.position)
-        return distance if distance > self.meeting.reach else 0.0
+        distance = norm(base_position + impact.place - self.target_state.position)
+        return distance if distance > self.target_state.reach else 0.0
 
     def _motion(self, event: Capture) -> TargetMotion:
-        return self.meeting.motion if self.meeting else event.target.motion
+        return self.target_state.motion if self.target_state else event.target.motion
 
 
 class Captures:
@@ -72,12 +72,7 @@ class Captures:
     def __init__(
         self, events: Sequence[Event], robot: Robot, period: float, orbit: OrbitSettings
     ) -> None:
-        """Place the events in ticks of ``period`` seconds.
-
-        Raises:
-            InputError: the order of events is invalid, ``robot`` lacks a tool, or ``orbit`` is none
-                where a target is on a neighbouring one.
-        """
+        """Place the events in ticks of ``period`` seconds."""
         self._robot = robot
         self.misses: dict[float, float] = {}
         """Distances, m, by tick, of captures that have missed their target."""
@@ -88,8 +83,8 @@ class Captures:
             if isinstance(event, Capture):
                 grasp = Grasp.of(robot, event.target)
                 target = event.target
-                meeting = meet(target, orbit, tick * period) if target.is_in_orbit else None
-                exchange = CaptureEvent(tick, event, robot, grasp.holding(robot), grasp, meeting)
+                free = target_state(target, orbit, tick * period) if target.is_in_orbit else None
+                exchange = CaptureEvent(tick, event, robot, grasp.holding(robot), grasp, free)
             else:
                 last = self.exchanges[-1]
                 exchange = CaptureEvent(tick, event, last.after, robot, last.grasp)
@@ -103,7 +98,7 @@ class Captures:
         return np.array([1.0, 0.0, 0.0, 0.0]), joints, np.zeros((0, 3)), np.zeros(0)
 
     def at(self, tick: int) -> list[CaptureEvent]:
-        """Return the event at the begin of ``tick``."""
+        """Return the events at the begin of ``tick``."""
         return [exchange for exchange in self.exchanges if exchange.tick == tick]
 
     def ticks(self, start: int, stop: int) -> list[int]:
@@ -140,6 +135,7 @@ class Captures:
                 continue
             happened = True
             velocities[places] = exchange.velocity_after(impact, velocities[places])
+            # only the carrier changes: wheels and gears are mounted in the plant's model alone
             body, of_robot = exchange.grasp.body, exchange.after.model
             body = 1 + int(row[body - 1]) if body else 0
             for name in ("mass", "inertia", "com"):

@@ -88,11 +88,13 @@ def disturbance_torque(disturbance: Disturbance, time: float, out: Array) -> Non
     On the base about inertial axes, then on the joints.
     """
     frequency = disturbance.angular_frequency
+    # (61): base, joints 1 to 3, joints 4 and up
     for group in range(3):
         first, last = 3 * group, out.size if group == 2 else min(3 * group + 3, out.size)
         amplitude = disturbance.amplitude[group]
         torque = amplitude
         if any_lane(amplitude != 0.0):
+            # a sum of two sines; one of 0 Hz is none, as on the outer joints
             wave = sin_cos(frequency[group, 0] * time)[0] + sin_cos(frequency[group, 1] * time)[0]
             torque = where(amplitude != 0.0, amplitude * wave, 0.0)
         for i in range(first, last):
@@ -147,11 +149,8 @@ def begin_loads(loads: PrescribedLoads, tick: int, period: float, actuation: Arr
 def add_loads(loads: PrescribedLoads, time: float, wrench: Array, disturbance: Array) -> None:
     """Add the loads at ``time`` (s) within the present tick.
 
-    Args:
-        loads: of the robot.
-        time: s.
-        wrench: (6,) becomes the sum of what the actuators give and the loads on the base.
-        disturbance: (n+3,) N m, opposes motion; loads on joints are taken from it.
+    ``wrench`` (6,) becomes the sum of what the actuators give and the loads on the base; loads on
+    joints are taken from ``disturbance`` (n+3,), which opposes motion.
     """
     since = time - loads.begin[0]
     for i in range(6):
@@ -164,18 +163,16 @@ class LoadSchedule:
     """Segments of a table, in ticks; the rest of a flight depends on its tick alone."""
 
     def __init__(self, time: Array, loads: Array, period: float) -> None:
-        """Place rows in ticks of ``period`` seconds.
+        """Place the rows ``loads`` (K, n+6), see `PrescribedLoads`, in ticks of ``period`` s.
 
-        Args:
-            time: (K,) s, rising; empty: there are no loads.
-            loads: (K, n+6) N and N m, see `PrescribedLoads`.
-            period: s.
+        ``time`` (K,) rises, s; without rows there are no loads.
         """
         self._period = period
         self._first, self._values, self._slopes = np.zeros(0), loads, loads
         if not time.size:
             return
         ticks = time / period
+        # 0.1 s / 0.5 ms is not 200 to the last bit
         ticks = np.where(np.abs(ticks - np.round(ticks)) <= ROUNDING, np.round(ticks), ticks)
         knots = np.unique([np.floor(ticks), np.ceil(ticks)])
         within = (ticks[0] <= knots) & (knots <= ticks[-1])

@@ -107,14 +107,9 @@ class DisturbanceTable(NamedTuple):
         return f"{names} from {time[0]:g} to {time[-1]:g} s"
 
     def loads(self, joint_names: Sequence[str], where: str = "disturbance") -> Array:
-        """Return the loads (K, n+6) of the rows: on the base as `BASE`, then on the joints.
+        """Return the loads (K, n+6) of the rows: on the base as `BASE`, then on joints with motors.
 
-        Args:
-            joint_names: of the n joints with motors.
-            where: the table's file, or key, for errors.
-
-        Raises:
-            InputError: a column is neither of the base nor of such a joint.
+        ``where`` names the table's file, or key, in errors.
         """
         names = [*BASE, *joint_names]
         loads = np.zeros((len(self.columns[TIME]), len(names)))
@@ -128,14 +123,9 @@ class DisturbanceTable(NamedTuple):
 
 
 def table_text(text: str, folder: Path = Path()) -> str:
-    """Return the numbers of a table, as text: of a text as they are, or of the file it names.
+    """Return a table as text: the ``text`` itself, or the table of the file that it names.
 
-    Args:
-        text: of a table, a path to a CSV or Parquet file, or empty.
-        folder: where a relative path begins.
-
-    Raises:
-        InputError: the file cannot be read, or its table is wrong.
+    A relative path begins in ``folder``; an empty text is none.
     """
     if not text.strip() or text.startswith(JSON):
         return text

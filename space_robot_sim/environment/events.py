@@ -74,15 +74,7 @@ FORMS = {
 
 
 def parse_events(texts: Iterable[str], folder: Path = Path()) -> list[Event]:
-    """Parse events and sort them by time; empty texts are ignored.
-
-    Args:
-        texts: as in ``capture@10:small_satellite``.
-        folder: where a target's file may be, see `find_target`.
-
-    Raises:
-        InputError: names the event, what is wrong with it, what is allowed.
-    """
+    """Parse events and sort them by time; a target's file may be in ``folder``."""
     return in_order([_read(text, folder) for text in texts if text.strip()])
 
 
@@ -92,6 +84,7 @@ def in_order(events: Sequence[Event]) -> list[Event]:
     Raises:
         InputError: capture while a target is held, or release without a target.
     """
+    # a stable sort: events of one time happen in the user's order
     ordered = sorted(events, key=lambda event: event.time_s)
     held: Capture | None = None
     for event in ordered:

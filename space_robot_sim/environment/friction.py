@@ -89,14 +89,11 @@ class Friction(Component):
 def friction_torque(friction: Friction, velocities: Array, directions: Array, out: Array) -> None:
     """Write into ``out`` the torque ``f_f`` that opposes the motion of each joint and wheel, N m.
 
-    Args:
-        friction: of the joints and wheels.
-        velocities: of the joints, then of the wheels, rad/s.
-        directions: 1 or -1, the sense in which each turns or begins to turn; 0 at rest, where
-            the holding torque is not computed.
-        out: as long as they are.
+    ``directions``: 1 or -1, the sense in which each turns or begins to turn; 0 at rest, where the
+    holding torque is not computed.
     """
     for i in range(whole(friction.count)):
         rate = velocities[i]
+        # the last term of (27); a joint at rest is locked in place of a torque that holds it
         direction = directions[i] if uniform(friction.set_valued) != 0.0 else np.sign(rate)
         out[i] = friction.coulomb[i] * direction + friction.viscous[i] * rate

@@ -52,6 +52,7 @@ def gravity_difference(r: Vector, d: Vector, has_j2: float) -> tuple[Vector, flo
     c, end = 1.0 + q, add(r, d)
     root = np.sqrt(c)
     c3 = c * root
+    # p_k = (1 + q)^(-k/2) - 1 of the module's formula, the polynomials by Horner's rule
     p3 = -q * (3.0 + q * (3.0 + q)) / (c3 * (1.0 + c3))
     fall = scale(add(d, scale(end, p3)), -MU / (square * distance))
     if uniform(has_j2) != 0.0:
@@ -82,12 +83,8 @@ def add_gravity_gradient(
 ) -> None:
     """Add gravity to the bias forces of all bodies, which oppose the forces on them.
 
-    Args:
-        model: of the robot.
-        reference: (3,) position of the reference point from the Earth's centre, m.
-        base_position: (3,) of the base's CoM from the reference point, m, inertial axes.
-        has_j2: 1 with the Earth's oblateness, else 0.
-        data: with the bodies' places; ``bias`` is changed.
+    ``reference`` is the reference point's position from the Earth's centre, ``base_position`` that
+    of the base's CoM from there, m, inertial axes; ``data`` has the bodies' places.
     """
     r, base = vector(reference, 0), vector(base_position, 0)
     away = np.sqrt(dot(r, r))
@@ -98,7 +95,7 @@ def add_gravity_gradient(
         place = add(base, com)
         fall, ratio = gravity_difference(r, place, has_j2)
         force = scale(fall, mass)
-        # of the body's extent
+        # of the body's extent: inertia about its centre of mass, from that about its frame
         nearness = 1.0 / (away * ratio)
         u = scale(add(r, place), nearness)
         own = symmetric(data.inertia[i])

@@ -108,7 +108,7 @@ class Impact:
             wheel_inertia: (W,) kg m2 of the rotors about their axes.
         """
         base = base_axes(quaternion[:, np.newaxis])
-        walk = body_frames(holding, (base[0], base[1], base[2]), joint_positions[:, np.newaxis])
+        walk = body_frames(holding, base, joint_positions[:, np.newaxis])
         frames = {frame.body: frame for frame in walk}
         carrier = frames[grasp.body]
         axes = _axes(carrier)
@@ -142,7 +142,7 @@ class Impact:
         """Return qdot before a capture that led to ``velocity``."""
         if motion.relative_to == "tool":
             return velocity - product(self._gain, self._relative(motion, velocity))
-        # qdot+ = qdot- + K (u_target - J qdot-)
+        # qdot+ = qdot- + K (u_target - J qdot-), K = H^-1 J^T M: solved for qdot-
         known: Array = velocity - product(self._gain, _spatial(motion))
         matrix = np.eye(len(velocity)) - product(self._gain, self.jacobian)
         return solve(matrix, known)
@@ -168,6 +168,7 @@ class Impact:
         """Write the columns of the base and of the joints between it and the hand."""
         place = self.place
         self.jacobian[:, :6] = np.eye(6)
+        # velocity w x r of the place, for w along each axis
         self.jacobian[:3, 3:6] = np.cross(np.eye(3), place).T
         body = grasp.body
         while body:
@@ -192,6 +193,7 @@ def _spatial(motion: TargetMotion) -> Array:
 def _with_leaves(inertia: Array, rows: Array, own: Array) -> Array:
     """Return the inertia with those of wheels and rotors: couplings (K, N+6) and their own (K,)."""
     size, count = len(inertia), len(own)
+    # each turns about its own axis only: a leaf couples to its carrier, never to another leaf
     whole = np.zeros((size + count, size + count))
     whole[:size, :size] = inertia
     whole[size:, :size], whole[:size, size:] = rows, rows.T

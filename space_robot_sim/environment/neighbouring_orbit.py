@@ -33,8 +33,8 @@ TURN, LARGEST_TURN = 0.05, 0.1
 MOST_STEPS = 50_000
 
 
-class Meeting(NamedTuple):
-    """A target at its capture."""
+class TargetState(NamedTuple):
+    """Place and motion of a target in free fall, as its capture needs them."""
 
     position: Array
     """(3,) of its centre of mass from the inertial frame's origin, m, inertial axes."""
@@ -44,16 +44,12 @@ class Meeting(NamedTuple):
     """Largest distance from where the tool holds it, m."""
 
 
-def meet(target: Target, orbit: OrbitSettings, time: float) -> Meeting:
-    """Return where ``target`` is at ``time``, s, and how it moves.
-
-    Raises:
-        InputError: there is no orbit, or the target turns too fast to be followed for so long.
-    """
+def target_state(target: Target, orbit: OrbitSettings, time: float) -> TargetState:
+    """Return where ``target`` is at ``time``, s, and how it moves."""
     (x,) = _states(target, orbit, np.array([time]))
     rotation = np.empty((3, 3))
     rotation_matrix(x[12:16], rotation)
-    return Meeting(
+    return TargetState(
         x[6:9],
         TargetMotion.model_construct(  # it may be faster by now than a file may say
             relative_to="inertial",
@@ -64,8 +60,8 @@ def meet(target: Target, orbit: OrbitSettings, time: float) -> Meeting:
     )
 
 
-def fall(target: Target, orbit: OrbitSettings, times: Array) -> tuple[Array, Array]:
-    """Return the poses of ``target`` in free fall, as `meet` follows it.
+def free_fall(target: Target, orbit: OrbitSettings, times: Array) -> tuple[Array, Array]:
+    """Return the poses of ``target`` in free fall, integrated as in `target_state`.
 
     Args:
         target: on a neighbouring orbit.
@@ -83,23 +79,12 @@ def _states(target: Target, orbit: OrbitSettings, times: Array) -> Iterator[Arra
     x, now = _at_tick_0(target, orbit), 0.0
     inertia, has_j2 = inertia_tensor(target.inertia), float(orbit.gravity.j2)
     for time in times.tolist():
+        # equal steps that end at each time, so that no pose is interpolated
         steps = _steps(target, time - now)
         for _ in range(steps):
             x = _step(x, (time - now) / steps, inertia, has_j2)
         now = time
         yield x
-
-
-def relative_state(target: Target, orbit: OrbitSettings) -> tuple[Array, Array]:
-    """Return position, m, and velocity, m/s, of a target from the reference point at tick 0.
-
-    Each (3,), inertial axes, as seen from the inertial frame.
-
-    Raises:
-        InputError: there is no orbit.
-    """
-    x = _at_tick_0(target, orbit)
-    return x[6:9], x[9:12]
 
 
 def _at_tick_0(target: Target, orbit: OrbitSettings) -> Array:
@@ -111,6 +96,7 @@ def _at_tick_0(target: Target, orbit: OrbitSettings) -> Array:
     origin, velocity = state_of(orbit.orbital_elements)
     axes = hill_axes(origin, velocity)
     rate = np.array([0.0, 0.0, norm(np.cross(origin, velocity)) / norm(origin) ** 2])
+    # the orbit's axes turn: what is seen from them lacks omega x r
     relative = np.array(motion.velocity) + np.cross(rate, motion.position)
     quaternion = np.array(motion.quaternion)
     return np.concatenate(

@@ -40,7 +40,7 @@ Array = NDArray[np.float64]
 
 EARTH_RATE = 7.292115e-5
 """Angular velocity of the Earth, rad/s."""
-NODE, NONE = "plant", "none"
+NODE, NO_ORBIT = "plant", "none"
 SECTIONS = ("plant_node", "/plant_node", "/**", "/**/plant_node")
 """Keys of a parameter file that are read by the plant."""
 
@@ -125,11 +125,7 @@ class OrbitSettings(StrictModel):
     def check_orbit(self, where: str) -> None:
         """Check that nothing is set that needs an orbit, unless there is one.
 
-        Args:
-            where: name of the source, for errors.
-
-        Raises:
-            InputError: something is set, names its key.
+        ``where`` names the source in errors.
         """
         for key in OrbitSettings.model_fields if not self.has_orbit else ():
             if getattr(self, key) != OrbitSettings.model_fields[key].default:
@@ -140,26 +136,14 @@ class OrbitSettings(StrictModel):
 
 
 def orbit_layers(name: str) -> list[Path]:
-    """Return the checked file of an orbit in a list; an empty list for none, or for numbers.
-
-    Args:
-        name: of config/orbits, or a path.
-
-    Raises:
-        InputError: there is no such file, or something in it is wrong or has no effect.
-    """
-    paths = [] if name == NONE else named_layers("orbits", name)
+    """Return the checked file of an orbit (of config/orbits, or a path) in a list; [] for none."""
+    paths = [] if name == NO_ORBIT else named_layers("orbits", name)
     for path in paths:
-        read_orbit(path)
+        _check_file(path)
     return paths
 
 
-def read_orbit(path: Path) -> OrbitSettings:
-    """Read an orbit's file.
-
-    Raises:
-        InputError: something in it is wrong or has no effect; names file and key.
-    """
+def _check_file(path: Path) -> None:
     for key in read_yaml(path):
         if key in OrbitSettings.model_fields:
             raise InputError(
@@ -170,9 +154,7 @@ def read_orbit(path: Path) -> OrbitSettings:
                 f"{path}: {printable(str(key))}: an orbit has parameters of plant_node, and of no "
                 "other node"
             )
-    settings = validate(OrbitSettings, node_parameters(path, NODE), str(path))
-    settings.check_orbit(str(path))
-    return settings
+    validate(OrbitSettings, node_parameters(path, NODE), str(path)).check_orbit(str(path))
 
 
 class Orbit(Component):
@@ -224,7 +206,8 @@ def density_at(orbit: Orbit, distance: float) -> float:
     """Return the density, kg/m3, at a distance from the Earth's centre, m."""
     exponent = -(distance - EARTH_RADIUS - orbit.at_height) / orbit.scale_height
     exponent = max(min(exponent, 700.0), -700.0)
-    # by squares, in the same operations for one flight and for eight; its error is below 1e-12
+    # exp(x / 1024) by its series, squared ten times: the same operations for one flight and for
+    # eight; the error is below 1e-12
     y = exponent / 1024.0
     power, term = 1.0, 1.0
     for k in range(1, 16):
@@ -246,6 +229,7 @@ def magnetic_field(orbit: Orbit, position: Array, time: float, out: Array) -> No
     r = vector(position, 0)
     distance = np.sqrt(dot(r, r))
     u, ratio = scale(r, 1.0 / distance), EARTH_RADIUS / distance
+    # minus: the pole in the north is the southern one of a magnet
     size = -orbit.strength * ratio * ratio * ratio
     store(scale(subtract(scale(u, 3.0 * dot(north, u)), north), size), out, 0)
 

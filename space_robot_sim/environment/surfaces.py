@@ -101,7 +101,7 @@ class Surfaces(Component):
 
 
 @kernel
-def press_on_surfaces(
+def fill_surface_wrenches(
     surfaces: Surfaces,
     model: Model,
     velocity: Array,
@@ -112,14 +112,8 @@ def press_on_surfaces(
 ) -> None:
     """Fill the wrenches of drag and sunlight.
 
-    Args:
-        surfaces: of the robot.
-        model: of the robot.
-        velocity: (3,) of the robot against the air, m/s, inertial axes.
-        density: of the air, kg/m3.
-        sun: (3,) unit vector to the Sun, inertial axes.
-        pressure: of the sunlight, N/m2; 0 in the shadow.
-        data: with the bodies' frames.
+    ``velocity`` (m/s) is against the air of ``density`` (kg/m3); ``sun`` is the unit vector to the
+    Sun, ``pressure`` (N/m2) that of its light, 0 in the shadow. Vectors are on inertial axes.
     """
     surfaces.drag[:] = 0.0
     surfaces.sunlight[:] = 0.0
@@ -133,6 +127,7 @@ def press_on_surfaces(
         for k in range(whole(surfaces.first[i]), whole(surfaces.first[i + 1])):
             plate = surfaces.plates[k]
             normal, centre = vector(plate, NORMAL), vector(plate, CENTRE)
+            # a plate that faces away from the wind, or from the Sun, gets nothing
             facing = plate[DRAG_COEFFICIENT] * plate[AREA] * max(dot(normal, u), 0.0)
             area = area + facing
             arm = add(arm, scale(centre, facing))

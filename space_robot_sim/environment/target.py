@@ -86,11 +86,7 @@ class Target(StrictModel):
 
     @classmethod
     def from_yaml(cls, path: str | Path) -> Target:
-        """Read and check a target's file.
-
-        Raises:
-            InputError: naming file, key, value given and values allowed.
-        """
+        """Read and check a target's file."""
         return cls.from_dict(read_yaml(Path(path)), where=str(path))
 
     @classmethod
@@ -127,12 +123,12 @@ def find_target(name: str, folder: Path) -> Target:
     ``folder``, which is that of the mission's file.
     """
     path = Path(name)
-    if path.suffix in (".yaml", ".yml") and not _is_there(path) and _is_there(folder / path):
+    if path.suffix in (".yaml", ".yml") and not _is_file(path) and _is_file(folder / path):
         path = folder / path
     return Target.from_yaml(named_file("targets", str(path)))
 
 
-def _is_there(path: Path) -> bool:
+def _is_file(path: Path) -> bool:
     try:
         return path.is_file()
     except (OSError, ValueError):  # what cannot be the name of a file

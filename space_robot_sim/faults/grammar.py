@@ -29,6 +29,7 @@ NUMBER = r"(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
 _FAULT = re.compile(
     rf"(?P<kind>[^@]*)@(?P<start>{NUMBER})(?:-(?P<stop>{NUMBER}))?(?::(?P<argument>.+))?", re.ASCII
 )
+# axes are counted from 1, so that none is called 0
 _AXIS_AND_NUMBER = re.compile(r"(?P<axis>(?!0+=).+)=(?P<number>[^=]+)", re.ASCII)
 
 
@@ -202,7 +203,8 @@ def parse_fault(text: str, kinds: Kinds) -> Fault:
 
 
 def parse_faults(texts: Iterable[str], kinds: Kinds) -> list[Fault]:
-    """Parse faults; empty texts are ignored (ROS has no empty list of strings)."""
+    """Parse faults; empty texts are ignored."""
+    # a ROS parameter cannot be an empty list of strings: that is [""]
     return [parse_fault(text, kinds) for text in texts if text.strip()]
 
 
@@ -214,14 +216,14 @@ def axes_of(name: str, about: About, names: RobotNames) -> tuple[int, ...]:
     Args:
         name: as written in the fault.
         about: the things that are allowed.
-        names: of what there is.
+        names: of the robot's axes and actuators.
 
     Raises:
         InputError: the name does not exist; the message lists the names.
     """
     base, every = len(BASE_AXES), range(len(names.axes))
     of_base, of_joints = {"base": tuple(every[:base])}, {"joints": tuple(every[base:])}
-    those = names.axes
+    listed = names.axes
     match about:
         case About.AXIS:
             meant, counted = every, every[base:]
@@ -232,11 +234,11 @@ def axes_of(name: str, about: About, names: RobotNames) -> tuple[int, ...]:
             meant, counted, groups = every[:base], every[:0], of_base
         case _:
             group = f"{about.name.lower()}s"
-            those = names.wheels if about is About.WHEEL else names.thrusters
-            meant = counted = range(len(those))
-            groups = {group: tuple(meant)} if those else {}
+            listed = names.wheels if about is About.WHEEL else names.thrusters
+            meant = counted = range(len(listed))
+            groups = {group: tuple(meant)} if listed else {}
     numbers = {str(1 + place - counted.start): (place,) for place in counted}
-    known = {those[place]: (place,) for place in meant}
+    known = {listed[place]: (place,) for place in meant}
     axes = {**numbers, **groups, **known}.get(name)
     if axes is None:
         also = [*([f"1 to {len(numbers)}"] if numbers else []), *groups]
@@ -247,6 +249,7 @@ def axes_of(name: str, about: About, names: RobotNames) -> tuple[int, ...]:
 
 def add_noise(sigma: Any, value: float) -> Any:
     """Add white noise to a standard deviation."""
+    # independent noises add by their variances
     return np.sqrt(sigma * sigma + value * value)
 
 

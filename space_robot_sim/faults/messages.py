@@ -106,8 +106,8 @@ class Link(Generic[Item]):
 def awaited_stamp(states: Iterable[DelayedMessage[Item]], tick: int, answered: int) -> int | None:
     """Return the tick whose command will come when these states reach a controller at ``tick``.
 
-    It is the newest stamp among them, for a controller that leaves alone what is no newer than
-    what it answered last (``answered``) and what lies in the future. None: no answer will come.
+    That is the newest stamp among them, since a controller does not answer states that are no newer
+    than the last one it answered (``answered``), or lie in the future. None: no answer will come.
     """
     fresh = [state.stamp for state in states if answered < state.stamp <= tick]
     return max(fresh, default=None)
@@ -152,6 +152,7 @@ class MessageFaults:
                 if fault.happens_at(tick):
                     arrays = [getattr(state, name) for name in SENSED_FIELDS]
                     arrays += [getattr(state, name)[: self._passive] for name in PASSIVE_FIELDS]
+                    # of all numbers any as likely, counted through the arrays
                     place = fault.choose(tick, sum(array.size for array in arrays))
                     for array in arrays:
                         if 0 <= place < array.size:

@@ -30,12 +30,7 @@ class ScheduledFault:
     def __init__(
         self, fault: Fault, index: int, seed: int, period: float, names: RobotNames = NO_NAMES
     ) -> None:
-        """Place ``fault``, the ``index``-th of the flight of a robot with these names.
-
-        Raises:
-            InputError: it ends before the first tick it could act at, or names something that
-                is not there.
-        """
+        """Place ``fault``, the ``index``-th of the flight of a robot with these names."""
         self.kind, self.value = fault.kind, fault.value
         self.axes: tuple[int, ...] = ()
         """Places of what it is about: of axes 0 to 2 of the base, then the joints; of wheels or
@@ -72,6 +67,7 @@ class ScheduledFault:
     def _draw(self, tick: int) -> Array:
         block, row = divmod(tick, BLOCK_TICKS)
         if block != self._block:
+            # a generator for each block: its numbers do not depend on the ticks asked for before
             rng = np.random.default_rng((*self._key, block))
             self._rows, self._block = rng.random((BLOCK_TICKS, 2)), block
         numbers: Array = self._rows[row]

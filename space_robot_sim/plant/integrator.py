@@ -61,10 +61,10 @@ class Stages(Record):
     actuation: Array = shaped(lambda n: (6 + MOST_MOVING,))
     """What the actuators give over the step: force (N) and torque (N m) on the base's axes, which
     turn with it, torques on the joints, actuated ones first, then those of wheels' motors, N m.
-    The force and torque contain the user's own wrench, if there is one."""
+    Force and torque include the user's own wrench."""
     force: Array = shaped(lambda n: (6 + MOST_MOVING,))
     """Generalised force, base part on inertial axes."""
-    of_field: Array = shaped(lambda n: (3,))
+    magnetic: Array = shaped(lambda n: (3,))
     """Torque of the magnetic field on the base, inertial axes, N m."""
     disturbance: Array = shaped(lambda n: (3 + MOST_JOINTS,))
     """f_d of (61) and of loads on joints, N m; none on passive joints."""
@@ -104,7 +104,9 @@ def state_size(model: Model, environment: Environment) -> int:
 
 
 @subroutine
-def disturb(environment: Environment, time: float, disturbance: Array, stages: Stages) -> None:
+def add_disturbances(
+    environment: Environment, time: float, disturbance: Array, stages: Stages
+) -> None:
     """Write f_d at ``time`` (s); a user's wrench on the base is added to ``stages.actuation``."""
     disturbance_torque(environment.disturbance, time, disturbance)
     if uniform(environment.loads.is_on) != 0.0:
@@ -115,49 +117,45 @@ def disturb(environment: Environment, time: float, disturbance: Array, stages: S
 def state_derivative(
     model: Model, environment: Environment, x: Array, disturbance: Array, stages: Stages, out: Array
 ) -> None:
-    """Write xdot into ``out``: (27).
+    """Write xdot of the state ``x`` (see `Stages`) into ``out``: (27).
 
-    Args:
-        model: the plant's robot.
-        environment: its friction.
-        x: the state, see `Stages`.
-        disturbance: (n+3,) f_d, N m, about inertial axes, then on the actuated joints.
-        stages: ``actuation``, and which joints and wheels slide in which sense and which stand;
-            scratch.
-        out: as ``x``.
+    ``disturbance`` (n+3,) is f_d, N m, about inertial axes, then on the actuated joints. The stages
+    have the actuation, and which joints and wheels slide in which sense and which stand.
     """
     n, friction, data = whole(model.joint_count), environment.friction, stages.data
     quaternion, theta = x[3:7], x[7 : 7 + n]
     v0, w0, velocities = x[7 + n : 10 + n], x[10 + n : 13 + n], x[13 + n :]
-    force, actuation, resisting = stages.force, stages.actuation, stages.friction
+    force, actuation, opposing = stages.force, stages.actuation, stages.friction
+    # (27) solved for the accelerations by `aba`: what drives is F - f_d - f_f
     forward_kinematics(model, quaternion, theta, data)
     spatial_velocities(model, w0, velocities, data)
     rotate(data.rotation, actuation[:3], force[:3])
     rotate(data.rotation, actuation[3:6], force[3:6])
     for k in range(3):
         force[3 + k] -= disturbance[k]
-    friction_torque(friction, velocities, stages.directions, resisting)
+    friction_torque(friction, velocities, stages.directions, opposing)
     motors = first_motor_angle(model) - 1
     for i in range(n):
         j = whole(model.row[i])
         if i < whole(model.actuated_count) and uniform(model.rotor[j]) != 0.0:
+            # a spring between link and rotor: drive and friction act on the rotor alone
             row, motor = rotor_row(model, j), motors + whole(model.rotor[j])
-            of_gear = model.stiffness[j] * (x[motor] - theta[j])
-            of_gear += model.damping[j] * (velocities[row] - velocities[j])
-            force[6 + j] = of_gear - disturbance[3 + i]
-            force[6 + row] = actuation[6 + i] - of_gear - resisting[row]
+            spring = model.stiffness[j] * (x[motor] - theta[j])
+            spring += model.damping[j] * (velocities[row] - velocities[j])
+            force[6 + j] = spring - disturbance[3 + i]
+            force[6 + row] = actuation[6 + i] - spring - opposing[row]
             out[motor] = velocities[row]
         elif i < whole(model.actuated_count):
-            force[6 + j] = actuation[6 + i] - disturbance[3 + i] - resisting[j]
+            force[6 + j] = actuation[6 + i] - disturbance[3 + i] - opposing[j]
         else:
             spring = model.stiffness[j] * (theta[j] - model.rest[j])
-            force[6 + j] = -spring - model.damping[j] * velocities[j] - resisting[j]
+            force[6 + j] = -spring - model.damping[j] * velocities[j] - opposing[j]
     for k in range(n, n + whole(model.wheel_count)):
-        force[6 + k] = actuation[6 + k] - resisting[k]
+        force[6 + k] = actuation[6 + k] - opposing[k]
     for k in range(3):
         out[k] = v0[k]
     if uniform(environment.orbit.is_on) != 0.0:
-        _fall(model, environment, x, stages, out)
+        _add_orbit(model, environment, x, stages, out)
     quaternion_rate(quaternion, w0, out[3:7])
     for i in range(n):
         out[7 + i] = velocities[i]
@@ -165,7 +163,9 @@ def state_derivative(
 
 
 @subroutine
-def _fall(model: Model, environment: Environment, x: Array, stages: Stages, out: Array) -> None:
+def _add_orbit(
+    model: Model, environment: Environment, x: Array, stages: Stages, out: Array
+) -> None:
     """Add what acts in orbit to bias forces and force, and write the origin's rates."""
     orbit, at = environment.orbit, first_orbit_number(model)
     for k in range(3):
@@ -175,9 +175,9 @@ def _fall(model: Model, environment: Environment, x: Array, stages: Stages, out:
         add_gravity_gradient(model, x[at : at + 3], x[:3], orbit.has_j2, stages.data)
     if uniform(environment.surfaces.count) > 0.0:
         add_surface_wrenches(environment.surfaces, model, stages.data)
-    rotate(stages.data.rotation, orbit.magnetic_torque, stages.of_field)
+    rotate(stages.data.rotation, orbit.magnetic_torque, stages.magnetic)
     for k in range(3):
-        stages.force[3 + k] += stages.of_field[k]
+        stages.force[3 + k] += stages.magnetic[k]
 
 
 @kernel
@@ -194,13 +194,14 @@ def rk4_step(
     for k in range(1, 4):
         step = period if k == 3 else 0.5 * period
         if k != 2:  # the two stages in the middle are at one time
-            disturb(environment, time + step, disturbance, stages)
+            add_disturbances(environment, time + step, disturbance, stages)
         for i in range(size):
             stage[i] = x[i] + step * slope[k - 1, i]
         state_derivative(model, environment, stage, disturbance, stages, slope[k])
     for i in range(size):
         slopes = slope[0, i] + 2.0 * (slope[1, i] + slope[2, i]) + slope[3, i]
         end[i] = x[i] + period / 6.0 * slopes
+    # a step of Runge and Kutta's leaves the unit sphere by an error of fifth order
     norm = np.sqrt(end[3] * end[3] + end[4] * end[4] + end[5] * end[5] + end[6] * end[6])
     for i in range(3, 7):
         end[i] /= norm
@@ -213,7 +214,7 @@ MOST_PIVOTS = 64
 MOST_TRIALS = 64
 AT_REST = 1e-16
 """rad/s; a velocity that small where the step is cut is rounding."""
-NONE = -1
+NO_JOINT = -1
 
 
 @kernel
@@ -227,8 +228,8 @@ def integrate(
         slip_or_stick(model, environment, x, time, stages)
         rk4_step(model, environment, x, time, left, stages)
         joint = first_at_rest(model, environment, x, stages)
-        if joint == NONE:
-            _take(model, environment, stages, x)
+        if joint == NO_JOINT:
+            _accept(model, environment, stages, x)
             return
         velocity = first_velocity(model) + joint
         if x[velocity] == 0.0:  # broke away and came back
@@ -237,22 +238,22 @@ def integrate(
         length = left
         for _ in range(MOST_CUTS):  # one that comes to rest still earlier is met on the way
             velocity = first_velocity(model) + joint
-            length = cut(model, environment, x, time, length, velocity, stages)
-            stages.end[velocity] = 0.0
+            length = find_stop(model, environment, x, time, length, velocity, stages)
+            stages.end[velocity] = 0.0  # by this zero a joint at rest is known
             joint = first_at_rest(model, environment, x, stages)
-            if joint == NONE:
+            if joint == NO_JOINT:
                 break
-        _take(model, environment, stages, x)
+        _accept(model, environment, stages, x)
         stages.held[: whole(environment.friction.count)] = 0.0
         time += length
         left -= length
     slip_or_stick(model, environment, x, time, stages)
     rk4_step(model, environment, x, time, left, stages)
-    _take(model, environment, stages, x)
+    _accept(model, environment, stages, x)
 
 
 @subroutine
-def _take(model: Model, environment: Environment, stages: Stages, x: Array) -> None:
+def _accept(model: Model, environment: Environment, stages: Stages, x: Array) -> None:
     for i in range(state_size(model, environment)):
         x[i] = stages.end[i]
 
@@ -272,10 +273,11 @@ def slip_or_stick(
     for i in range(n):
         directions[i] = sticks * np.sign(x[first + i]) if coulomb[i] > 0.0 else 0.0
         data.locked[i] = sticks if x[first + i] == 0.0 and coulomb[i] > 0.0 else 0.0
-    disturb(environment, time, disturbance, stages)
+    add_disturbances(environment, time, disturbance, stages)
     for _ in range(MOST_PIVOTS):
         state_derivative(model, environment, x, disturbance, stages, derivative)
-        changed = NONE
+        # one joint a round, the first: pivoting with the least index cannot cycle
+        changed = NO_JOINT
         for i in range(n):
             if x[first + i] != 0.0 or coulomb[i] * sticks == 0.0 or stages.held[i] != 0.0:
                 continue
@@ -283,25 +285,24 @@ def slip_or_stick(
                 if abs(data.holding[i]) > coulomb[i]:
                     data.locked[i], directions[i] = 0.0, np.sign(data.holding[i])
                     changed = i
+            # it was let go, but would be pushed back: the friction holds it
             elif derivative[first + i] * directions[i] < 0.0:
                 data.locked[i], directions[i] = 1.0, 0.0
                 changed = i
-            if changed != NONE:
+            if changed != NO_JOINT:
                 break
-        if changed == NONE:
+        if changed == NO_JOINT:
             return
 
 
 @kernel
-def glide(
+def regular_step(
     model: Model, environment: Environment, x: Array, time: float, period: float, stages: Stages
 ) -> bool:
-    """Write into ``stages.end`` the state after ``x`` if no joint stops or breaks away.
-
-    In lanes, where those of the others must be found by `integrate`, flight by flight.
+    """Write into ``stages.end`` the state after ``x`` in lanes where no joint stops or breaks away.
 
     Returns:
-        In which lanes that is so.
+        The mask of these lanes; the others are to be integrated by `integrate`, one by one.
     """
     directions, coulomb, end = stages.directions, environment.friction.coulomb, stages.end
     first, sticks = first_velocity(model), uniform(environment.friction.set_valued)
@@ -311,8 +312,9 @@ def glide(
         directions[i] = where(has_friction, np.sign(x[first + i]), 0.0)
         locked[i] = where(has_friction & (x[first + i] == 0.0), 1.0, 0.0)
     disturbance = stages.disturbance[: 3 + whole(model.actuated_count)]
-    disturb(environment, time, disturbance, stages)
+    add_disturbances(environment, time, disturbance, stages)
     state_derivative(model, environment, x, disturbance, stages, stages.slope[0])
+    # a standing joint whose holding torque exceeds f_C breaks away
     goes_on = True
     for i in range(n):
         breaks_away = (locked[i] != 0.0) & (abs(stages.data.holding[i]) > coulomb[i])
@@ -327,12 +329,13 @@ def glide(
 
 @kernel
 def first_at_rest(model: Model, environment: Environment, x: Array, stages: Stages) -> int:
-    """Return the joint that came to rest first between ``x`` and ``stages.end``, or `NONE`."""
+    """Return the joint that came to rest first between ``x`` and ``stages.end``, or `NO_JOINT`."""
     directions, end = stages.directions, stages.end
-    first, earliest, joint = first_velocity(model), 2.0, NONE
+    first, earliest, joint = first_velocity(model), 2.0, NO_JOINT
     for i in range(whole(environment.friction.count)):
         before, after = x[first + i], end[first + i]
         if after * directions[i] < 0.0:
+            # by a straight line between the two; `find_stop` has the root
             share = before / (before - after)
             if share < earliest:
                 earliest, joint = share, i
@@ -340,7 +343,7 @@ def first_at_rest(model: Model, environment: Environment, x: Array, stages: Stag
 
 
 @kernel
-def cut(
+def find_stop(
     model: Model,
     environment: Environment,
     x: Array,
@@ -365,6 +368,7 @@ def cut(
             break
         if rate * at_high > 0.0:
             high, at_high = length, rate
+            # Illinois: an end that stays twice counts half, else the other would creep
             if side == -1:
                 at_low *= 0.5
             side = -1

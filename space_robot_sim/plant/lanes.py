@@ -1,8 +1,8 @@
 """Plants of eight flights, stepped together.
 
 Over most steps every joint slides or stands all through, so that all flights take the same course
-(`integrator.glide`). A flight in which a joint stops or breaks away is integrated by itself over
-that step.
+(`integrator.regular_step`). A flight in which a joint stops or breaks away is integrated by itself
+over that step.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from space_robot_msgs_py.compiled.lanes import (
 from space_robot_msgs_py.compiled.records import Block
 
 from ..environment.environment import Environment
-from .integrator import glide, integrate, state_size
+from .integrator import integrate, regular_step, state_size
 from .tick import PlantMemory, begin_interval, end_interval
 
 Array = NDArray[np.float64]
@@ -40,16 +40,10 @@ def advance_lanes(
     period: float,
     flies: bool,
 ) -> float:
-    """Fly eight plants from ``tick`` to the next, see `advance`.
+    """Fly eight plants from ``tick`` to the next under a ``torque`` each, see `advance`.
 
-    Args:
-        memory: in lanes.
-        alone: (8,) block of `PlantMemory`, in which a flight is integrated by itself.
-        command_delay_buffer: in lanes, as ``torque``.
-        torque: the command of each flight.
-        tick: at which it is given.
-        period: s.
-        flies: mask of the lanes that count.
+    All are in lanes but ``alone``, a block (8,) in which a flight is integrated by itself.
+    ``flies`` is the mask of the lanes that count.
     """
     begin_interval(memory, command_delay_buffer, torque, tick, period)
     move_lanes(memory, alone, tick * period, period, flies)
@@ -68,7 +62,7 @@ def move_lanes(memory: PlantMemory, alone: Block, start: float, period: float, f
     step = period / substeps
     for k in range(substeps):
         time = start + k * step
-        goes_on = glide(model, memory.environment, x, time, step, stages)
+        goes_on = regular_step(model, memory.environment, x, time, step, stages)
         moves = goes_on & flies
         for i in range(state_size(model, memory.environment)):
             x[i] = where(moves, stages.end[i], x[i])
@@ -83,6 +77,7 @@ def _move_alone(
     memory: PlantMemory, alone: PlantMemory, lane: int, time: float, step: float
 ) -> None:
     """Integrate the flight of one lane over a step."""
+    # of its block only what changed since is copied: state, actuation, what acts over the tick
     x, stages = memory.x, alone.stages
     actuation = memory.stages.actuation
     for i in range(state_size(alone.model, alone.environment)):

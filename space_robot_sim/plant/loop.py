@@ -27,13 +27,13 @@ from space_robot_msgs_py.samples import Command
 from space_robot_msgs_py.wire.codecs import CommandCodec, StateCodec
 from space_robot_msgs_py.wire.telemetry import ClockCodec
 
-from .messages import NONE, CommandGuard, PlantMessages, SentState
+from .messages import NO_TICK, CommandGuard, PlantMessages, SentState
 from .outputs import BaseOutput, SceneOutput, TruthOutput
 from .pacing import (
     PAUSED,
     SPIN_BEFORE_DEADLINE_S,
+    ControllerWatch,
     LateListeners,
-    OwnController,
     RunControl,
     WallClock,
 )
@@ -43,11 +43,11 @@ from .settings import PlantNodeSettings
 
 TIMEOUT_S = 0.02
 ASK_AGAIN_S = 0.2
-"""Without an answer for this long the state is sent again (lockstep): well before a listener takes
-this plant for silent, and soon enough for one that believes a new time only after some states."""
+"""Time without an answer after which the state is sent again in lockstep, s: well before a listener
+takes the plant for silent, and soon enough for one that accepts a new time after some states."""
 GIVE_WAY = Wait(100e-6, is_for_others=True)
 HELD = Wait(0.02)
-"""The wait of a paused plant: only a service call ends the pause, and those have their own time."""
+"""The wait of a paused plant, which only a service call ends."""
 FLUSH_S = 2.0
 """Longest wait for listeners at the end of a flight, which may be stopped or dead, s."""
 STOPPED_FLUSH_S = 1.0
@@ -66,7 +66,7 @@ class PlantLoop:
     """
 
     def __init__(self, node: ManagedNode[PlantNodeSettings], settings: PlantNodeSettings) -> None:
-        """Make the plant and load its compiled code, so that no tick comes late for it."""
+        """Make the plant and its topics."""
         self._node, self._settings = node, settings
         source = robot_source(settings.robot)
         robot = source.robot
@@ -74,6 +74,7 @@ class PlantLoop:
         self._description = plant_description(robot, source.content, self._plant, settings)
         names = self._plant.names
         at_rest = Command(0, np.zeros(len(names.commanded)))
+        # a step of another plant: compiled code is loaded now, not in the first tick
         Plant(robot, settings, settings.period).step(at_rest)
         self._actuators = ActuatorHealth(self._plant)
         timebase = settings.timebase
@@ -104,32 +105,32 @@ class PlantLoop:
         self.wait_for = settings.wait_for
         self.is_complete = False
         self.control = RunControl(settings.paused)
-        """Pausing and stepping; each change must be announced by `tell_paused`."""
+        """Pausing and stepping; each change must be announced by `report_pause`."""
         self._paused_out = PausedOutput(node)
         self._wall_clock = WallClock(settings.period)
         self._silence_s = settings.silence_timeout or math.inf
-        self._own = OwnController(node, self._command_in, settings)
+        self._watch = ControllerWatch(node, self._command_in, settings)
         self._controller_silent = False
         self._by_the_clock = False
-        """True if the tick that is under way lasts its period by the wall clock."""
+        """True if the present tick lasts its period by the wall clock."""
         self._must_give_way = False
         self._is_under_way = False
         """True if the tick's state has been measured."""
         self._unsent: deque[SentState] = deque()
         """States of this tick that are still to be sent: in lockstep, once the one before has been
         answered."""
-        self._sent, self._clock_sent = SentState((), NONE), b""
-        self._answered_by = NONE
+        self._sent, self._clock_sent = SentState((), NO_TICK), b""
+        self._answered_by = NO_TICK
         """Tick of the newest command that can come."""
         self._awaits = False
-        """True if it is waited for, in lockstep."""
-        self._heard = self._heard_before = NONE
-        """The newest tick that a command has come for: now, and at this tick's begin."""
+        """True if lockstep waits for it."""
+        self._heard = self._heard_before = NO_TICK
+        """Newest tick that a command answers: now, and at this tick's begin."""
         self._sent_at = self._awaited_since = 0.0
         self._began_at, self._first_tick = time.monotonic(), 0
         self._answers, self._latency_s, self._latency_max_s = 0, 0.0, 0.0
         self.missed_deadlines = 0
-        """Ticks whose command was not there by their end, be it late or never sent."""
+        """Ticks whose command had not come by their end."""
 
     def begin(self) -> None:
         """Begin with the state of the present tick."""
@@ -141,9 +142,9 @@ class PlantLoop:
             text = String(data=json.dumps(self._description))
             self._description_out.publish(serialize_message(text))
         self._scene.begin()
-        self.tell_paused()
+        self.report_pause()
 
-    def tell_paused(self) -> None:
+    def report_pause(self) -> None:
         """Publish whether the plant is paused."""
         self._paused_out.tell(self.control.is_paused)
         self._node.report()
@@ -152,11 +153,10 @@ class PlantLoop:
         """Send a state, or take its answer and step the plant.
 
         Raises:
-            DivergedError: see `Plant.step`.
             FlightError: the controller that others start does not come, or has fallen silent.
         """
         if not self._is_under_way:
-            if self._own.is_awaited():
+            if self._watch.is_awaited():
                 return HELD
             self._begin_tick()
         if self._by_the_clock:
@@ -209,7 +209,7 @@ class PlantLoop:
             values["latency_max_ms"] = 1e3 * self._latency_max_s
         if self.control.is_paused:
             return Health(PAUSED, values=values)
-        if self._own.is_missing:
+        if self._watch.is_missing:
             return Health(
                 f"waiting for a node that publishes {self._command_in.full_name}", values=values
             )
@@ -233,6 +233,7 @@ class PlantLoop:
         self._unsent.extend(self._exchange.send(self._plant.state))
         if self._unsent:
             self._send_next()
+        # the state is out: the rest is done while it is being answered
         if tick % self._settings.clock_decimation == 0:
             self._clock_sent = self._clock.encode(self._timebase.stamp_ns(tick))
             self._clock_out.publish(self._clock_sent)
@@ -243,7 +244,7 @@ class PlantLoop:
     def _send_next(self) -> None:
         self._sent = state = self._unsent.popleft()
         self._publish()
-        if state.answered_by != NONE:
+        if state.answered_by != NO_TICK:
             self._answered_by, self._awaits = state.answered_by, True
             self._awaited_since = self._sent_at
 
@@ -253,24 +254,24 @@ class PlantLoop:
         self._sent_at = time.monotonic()
 
     def _wait_for_answer(self) -> Wait | None:
-        """Wait on for the answer; ask for it again, or give the controller up for silent."""
+        """Wait on for the answer; send the state again, or take the controller for silent."""
         now = time.monotonic()
         if now > self._awaited_since + self._silence_s and self._heard >= 0:
-            self._own.check_silence(self._plant.tick)
+            self._watch.check_silence(self._plant.tick)
             self._node.log(f"no command for {self._silence_s:g} s: the controller is silent")
             self._controller_silent, self._awaits = True, False
             self._wall_clock.start(self._plant.tick)
             self._by_the_clock = True
             return None
         if self._heard < 0:
-            self._own.check_first(now - self._awaited_since, self._guard.refused)
+            self._watch.check_first(now - self._awaited_since, self._guard.refused)
         if now > self._sent_at + ASK_AGAIN_S:
             self._publish()
             self._clock_out.publish(self._clock_sent)
         return self._for_answer
 
     def _step_by_the_clock(self) -> Wait | None:
-        """Take what comes until the tick is over, then step the plant."""
+        """Take commands until the tick is over, then step the plant."""
         while self._unsent:
             self._send_next()
         if self._must_give_way:  # behind: catch up, but never take the whole processor
@@ -314,7 +315,7 @@ class PlantLoop:
             clock.start(0)  # time begins when the loop is closed
         elif self._by_the_clock:
             if (tick - self._heard) * self._settings.period > self._silence_s:
-                self._own.check_silence(tick)
+                self._watch.check_silence(tick)
             if clock.slip(tick) and (remark := clock.remark()):
                 self._node.log(remark)
         self.missed_deadlines += guard.answered != tick
@@ -331,7 +332,7 @@ class PlantLoop:
             self._begin_tick()
 
     def _take_all(self) -> None:
-        for _ in range(MOST_AT_ONCE):
+        for _ in range(MOST_AT_ONCE):  # a flood must not hold up the clock
             data = self._command_in.take()
             if data is None:
                 return
@@ -339,7 +340,7 @@ class PlantLoop:
                 self._time_answer()
 
     def _receive(self, data: bytes) -> int | None:
-        """Take a command that has come, if it is good; the tick it answers, if it can be read."""
+        """Accept a command if it is good; return the tick that it answers, if it can be read."""
         guard = self._guard
         try:
             self._commands.decode(data, guard.offered)
@@ -347,7 +348,7 @@ class PlantLoop:
             guard.refuse(error.reason)
             return None
         tick = guard.offered.tick
-        if self._heard < tick <= self._plant.tick:
+        if self._heard < tick <= self._plant.tick:  # a stamp of the future answers nothing
             self._heard = tick
         self._exchange.take(self._plant.tick)
         return tick

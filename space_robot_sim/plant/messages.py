@@ -59,10 +59,11 @@ class CommandGuard:
             self.refused["stamp"] += 1
             return False
         torque = self.offered.torque
-        # a sum takes a third of the time of `isfinite`; finite unless a number is not, or huge
+        # a sum takes a third of the time of `isfinite`; finite, unless a number is not or huge
         if not (math.isfinite(sum(torque.tolist())) or np.isfinite(torque).all()):
             self.refused["not finite"] += 1
             return False
+        # two buffers change places: nothing is allocated in a tick
         self._accepted, self.offered = self.offered, self._accepted
         return True
 
@@ -81,7 +82,7 @@ class CommandGuard:
         return self.acting
 
 
-NONE = -1
+NO_TICK = -1
 """No tick."""
 
 
@@ -91,11 +92,11 @@ class SentState(NamedTuple):
     messages: tuple[bytes, ...]
     """Its parts, in the order of `StateCodec.topics`."""
     answered_by: int
-    """Tick of the command that will come for it; `NONE`: no command will."""
+    """Tick of the command that will come for it; `NO_TICK`: no command will."""
 
 
 class PlantMessages:
-    """Hands every state out, and every command in; lost, late, repeated and spoilt as faults say.
+    """Passes states to the controller and commands back, with the faults of messages.
 
     A state that is lost, late or wrongly stamped has no answer to wait for: that is known here,
     so that a flight in lockstep repeats.
@@ -114,7 +115,7 @@ class PlantMessages:
         if settings.has_message_faults:
             schedule = settings.schedule(names, period)
             self._faults = MessageFaults(schedule, len(names.joints), len(names.passive))
-        self._asked = NONE
+        self._asked = NO_TICK
         """Tick of the newest state that a controller can have answered."""
 
     def send(self, state: RobotState) -> Iterable[SentState]:
@@ -128,7 +129,7 @@ class PlantMessages:
             stamp = awaited_stamp([arriving], state.tick, self._asked)
             if stamp is not None:
                 self._asked = stamp
-            sent.append(SentState(arriving.item, NONE if stamp is None else stamp))
+            sent.append(SentState(arriving.item, NO_TICK if stamp is None else stamp))
         return sent
 
     def take(self, tick: int) -> None:
@@ -144,7 +145,7 @@ class PlantMessages:
         self._faults.commands.send(tick, offered.torque.copy(), offered.tick)
 
     def end(self, tick: int) -> None:
-        """End the exchange of ``tick``: all that has come for it is there."""
+        """End the exchange of ``tick``, for which no more commands will come."""
         guard = self._guard
         for command in self._faults.commands.arrivals(tick) if self._faults else ():
             guard.offered.tick, guard.offered.torque[:] = command.stamp, command.item

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from space_robot_model.dynamics.model import Model
-from space_robot_model.hardware.wheels import WheelSettings
+from space_robot_model.hardware.base_actuators import WheelSettings
 from space_robot_model.robot import Robot
 from space_robot_model.robot.gears import flexible_model, geared_joints
 from space_robot_msgs_py.compiled.records import assign
@@ -24,14 +24,7 @@ Array = NDArray[np.float64]
 def mount_wheels(
     wheels: WheelSettings, model: Model, friction: Friction, velocities: Array
 ) -> None:
-    """Mount ``wheels`` on a plant's base, with their velocities at tick 0.
-
-    Args:
-        wheels: which fit the base.
-        model: of the plant's robot.
-        friction: in which that of the wheels is put.
-        velocities: (MOST_WHEELS,) of the wheels in the plant's state, rad/s.
-    """
+    """Mount ``wheels`` on a plant's base, with friction, and their ``velocities`` at tick 0."""
     count = wheels.count
     if not count:
         return
@@ -56,16 +49,8 @@ MOST_SUBSTEPS = 1000
 def mount_gears(robot: Robot, model: Model, friction: Friction, x: Array) -> None:
     """Mount the gears of ``robot`` after the wheels, with motors at rest where their joints are.
 
-    Friction of a joint with a gear acts on the motor's side, seen through the gear.
-
-    Args:
-        robot: of the plant.
-        model: of the same, with its wheels.
-        friction: of joints and wheels; that of geared joints moves to their motors.
-        x: the state at tick 0, see `space_robot_sim.plant.integrator.Stages`.
-
-    Raises:
-        InputError: a rotor has more inertia than the body that carries it.
+    Friction of a joint with a gear acts on the motor's side, seen through the gear. ``x`` is the
+    state at tick 0, see `space_robot_sim.plant.integrator.Stages`.
     """
     joints, n = geared_joints(robot), robot.joint_count
     if not joints:
@@ -80,6 +65,7 @@ def mount_gears(robot: Robot, model: Model, friction: Friction, x: Array) -> Non
         model.rotor[row] = k + 1
         model.rotor_inertia[row], model.gear_ratio[row] = gear.rotor_inertia, gear.ratio
         model.stiffness[row], model.damping[row] = gear.stiffness, gear.damping
+        # a gear's friction acts on its motor: it moves from the joint's row to the rotor's
         for coefficients in (friction.coulomb, friction.viscous):
             coefficients[first + k], coefficients[row] = coefficients[row], 0.0
         friction.row[joint] = first + k
@@ -94,6 +80,7 @@ def check_rotors(robot: Robot) -> None:
             for joint, gear in enumerate(robot.gears)
             if gear and robot.parent[joint] == body
         ]
+        # a body's sheet includes its rotors, the dynamics have them apart
         inertia = robot.inertia[body].copy()
         for joint, gear in carried:
             axis = robot.rotation[joint][:, 2]
@@ -118,17 +105,9 @@ def measured_motors(robot: Robot) -> list[int]:
 
 
 def check_springs(robot: Robot, joint_positions: Array, step: float, substeps: int) -> None:
-    """Check that the integrator's steps resolve the springs of the gears.
+    """Check that the integrator's steps of ``step`` s resolve the springs of the gears.
 
-    Args:
-        robot: of the plant.
-        joint_positions: (N,) of all joints at tick 0, rad or m.
-        step: of the integrator, s.
-        substeps: steps in a tick.
-
-    Raises:
-        InputError: a spring is too stiff, or a damper too strong; names it, and steps that would
-            do.
+    ``joint_positions`` (N,) are those at tick 0; ``substeps`` make a tick.
     """
     joints = geared_joints(robot)
     if not joints:
@@ -145,6 +124,7 @@ def check_springs(robot: Robot, joint_positions: Array, step: float, substeps: i
         return flexible_model(replace(robot, gears=only), joint_positions).fastest
 
     joint = max(joints, key=lambda joint: alone(joint, 1.0))
+    # without its damper the joint would be nearly as fast: then the spring is to blame
     key = "stiffness" if alone(joint, 0.0) > 0.8 * alone(joint, 1.0) else "damping"
     needed = math.ceil(step * substeps * fastest / STABLE * (1.0 + 1e-9))
     period = _rounded_down(substeps * STABLE / fastest * (1.0 - 1e-9))

@@ -35,7 +35,7 @@ class TruthOutput:
         self.outputs = tuple(self._outputs.values())
 
     def send(self, truth: RobotState) -> None:
-        """Take a tick's truth; best once its state is out and is being answered."""
+        """Take a tick's truth."""
         if self.outputs:
             self._publish(self._writer.add(truth))
 
@@ -70,13 +70,13 @@ class SceneOutput:
         self._has_begun = False
 
     def begin(self) -> None:
-        """Send what holds for the whole flight, once: who comes later gets it, too."""
+        """Send what holds for the whole flight, once; DDS keeps it for later subscribers."""
         if not self._has_begun:
             self._has_begun = True
             self._publish(self._writer.lasting())
 
     def send(self, truth: RobotState) -> None:
-        """Send the poses, if they are due; best once the tick's state is being answered."""
+        """Send the poses, if they are due."""
         if self._writer.is_due(truth.tick):
             self._publish(self._writer.poses(truth))
         if self._markers:
@@ -117,7 +117,7 @@ class MarkerOutput:
         """Send the shapes of a true state, if somebody listens."""
         if not self._output.listener_count:
             return
-        if not self._output.sent:  # those of the flight before may have other names
+        if not self._output.sent:  # a viewer may still have those of an earlier flight
             self._output.publish(no_markers())
         self._output.publish(self._markers.encode(truth.tick, self._poses.at(truth)))
 

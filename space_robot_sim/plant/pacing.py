@@ -30,7 +30,7 @@ class WallClock:
         self._period = period
         self._begin = 0.0
         self.lost_time_s = 0.0
-        """Time by which the wall clock has run ahead for good."""
+        """Time that the flight will not catch up."""
         self._remarked_s, self._remarked_at = 0.0, -math.inf
 
     def start(self, tick: int) -> None:
@@ -39,10 +39,11 @@ class WallClock:
 
     def left(self, tick: int) -> float:
         """Return the time until ``tick`` is over, s; negative if it is."""
+        # from the begin of all ticks: errors of single ones do not add up
         return self._begin + (tick + 1) * self._period - time.monotonic()
 
     def slip(self, tick: int) -> float:
-        """Set the deadlines back if ``tick`` was over long ago; returns by how much, s."""
+        """Set the deadlines back if ``tick`` was over long ago; return by how much, s."""
         behind = -self.left(tick)
         if behind < SLIP_S:
             return 0.0
@@ -95,7 +96,7 @@ class RunControl:
         self.tick, self.is_at_rest = tick, False
 
     def holds(self) -> bool:
-        """Tell, when all else is done, whether the plant must not leave the present tick."""
+        """Return whether the plant must stay at the present tick; call when all else is done."""
         self.is_at_rest = self.is_at_rest or self.tick >= self._hold_at
         return self.tick >= self._hold_at
 
@@ -113,11 +114,7 @@ class RunControl:
         return was_paused
 
     def step(self, ticks: int) -> int:
-        """Let the plant go so many ``ticks`` on; return the tick at which it is held then.
-
-        Raises:
-            InputError: it is not paused, or still in a step, or that is no number of ticks.
-        """
+        """Let the plant go ``ticks`` further; return the tick at which it is held then."""
         if ticks < 1:
             raise InputError(f"a step takes 1 tick or more, got {ticks}")
         if not self.is_paused:
@@ -128,9 +125,8 @@ class RunControl:
         return self.tick + ticks
 
 
-REPEAT_EVERY_S = 0.5
-REPEAT_FOR_S = 2.0
-"""Who takes messages as best effort may miss the first ones."""
+REPEAT_EVERY_S, REPEAT_FOR_S = 0.5, 2.0
+"""Repetition of messages for a new listener, which may miss the first ones as best effort."""
 
 
 class LateListeners:
@@ -143,7 +139,7 @@ class LateListeners:
         self._until = self._next = 0.0
 
     def begin(self) -> None:
-        """Begin a tick: who listens by now gets its messages."""
+        """Begin a tick: present listeners get its messages."""
         self._counts = None
 
     def are_due(self, now: float) -> bool:
@@ -163,8 +159,8 @@ DISCOVERY_S = 2.0
 Fast DDS of Jazzy: 0.1 to 1.8 s). The recorder would miss commands sent before."""
 
 
-class OwnController:
-    """Decides whether a plant waits for a controller, and when it gives it up."""
+class ControllerWatch:
+    """Decides whether a plant waits for its controller, and when the flight ends without one."""
 
     def __init__(
         self,
@@ -193,11 +189,9 @@ class OwnController:
         return self.is_missing
 
     def check_first(self, waited_s: float, refused: Mapping[str, int] | None = None) -> None:
-        """Check that the first command is not overdue.
+        """Check that the first command, awaited for ``waited_s``, is not overdue.
 
-        Args:
-            waited_s: time since it is awaited, s.
-            refused: commands that were refused, by reason.
+        ``refused`` counts refused commands by reason.
         """
         limit = self._settings.join_timeout
         if not limit or waited_s <= limit:

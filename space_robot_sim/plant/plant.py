@@ -70,6 +70,7 @@ class Plant(RecordOwner):
                 f"robot {robot.name!r} has {n} joints"
             )
         length = direction_norm(settings.initial_quaternion, "initial_quaternion")
+        # only the settings of a node name their files
         settings.check(robot, getattr(settings, "actuators", "given"))
         self.names = settings.robot_names(robot)._replace(in_orbit=settings.has_orbit)
         """Names of all measured and commanded quantities."""
@@ -108,21 +109,23 @@ class Plant(RecordOwner):
         mount_gears(robot, memory.model, memory.environment.friction, memory.x)
         check_springs(robot, positions, period / settings.substeps, settings.substeps)
         self._look_into_blocks()
-        # of joints at rest: what `write_truth` would say, without waiting for compiled code
+        # as `write_truth` does for joints at rest, without loading compiled code
         self.truth.quaternion[:] = memory.x[3:7]
         self.truth.joint_positions[:] = positions[:n]
         self.truth.passive_positions[: len(robot.springs)] = positions[n:]
         self.truth.wheel_velocities[:] = speeds
         geared = [position for position, gear in zip(positions, robot.gears, strict=False) if gear]
         self.truth.motor_positions[: len(geared)] = geared
-        self._put_into_orbit(robot)
-        # so that no tick has to wait for it
+        orbit, model = memory.environment.orbit, memory.model
+        first = 13 + 2 * robot.joint_count + int(model.wheel_count) + 2 * int(model.rotor_count)
+        memory.x[first : first + 6] = *orbit.position, *orbit.velocity
+        # captures load this kernel before the flight: no tick waits for it
         if turns or self.captures.exchanges or settings.has_orbit:
             update_true_state(self.block, 0, period)
         try:
             assign(memory, sensors=Sensors.build(settings, at))
         except InputError as error:
-            file = getattr(settings, "sensors", "given")  # the plant node's settings name it
+            file = getattr(settings, "sensors", "given")
             raise InputError(f"sensors {file}: {error}") from None
         schedule = settings.schedule(self.names, period)
         check_faults(schedule, settings)
@@ -132,7 +135,7 @@ class Plant(RecordOwner):
             for record in (Sensors, Actuators)
         }
         self._loads = LoadSchedule.of(settings.disturbance, self.names.joints, period)
-        if has_faults[Sensors]:
+        if has_faults[Sensors]:  # else ideal sensors skip the kernels that faults change
             assign(memory.sensors, are_ideal=False)
         self.measures_truth = (
             bool(memory.sensors.are_ideal)
@@ -155,20 +158,15 @@ class Plant(RecordOwner):
         self.begin_tick(0)
 
     def _set_turning(self, robot: Robot, rate_deg_s: list[float], positions: Array) -> None:
-        """Let the robot turn as one body about its centre of mass."""
+        """Let the robot turn as one body about its centre of mass, which is at rest."""
         n, quaternion = robot.joint_count, self.memory.x[3:7]
         omega = np.radians(rate_deg_s)
         motion = Motion(*(row[np.newaxis] for row in (quaternion, omega, positions, 0 * positions)))
+        # v0 = -omega x centre
         centre = robot_momentum(robot, motion).centre_of_mass
         turn = to_inertial(base_axes(quaternion[:, np.newaxis]), omega[:, np.newaxis])
         self.memory.x[7 + n : 10 + n] = cross(centre.T, turn)[:, 0]
         self.memory.x[10 + n : 13 + n] = turn[:, 0]
-
-    def _put_into_orbit(self, robot: Robot) -> None:
-        """Put the origin's position and velocity at tick 0 into the state."""
-        orbit, model = self.memory.environment.orbit, self.memory.model
-        at = 13 + 2 * robot.joint_count + int(model.wheel_count) + 2 * int(model.rotor_count)
-        self.memory.x[at : at + 3], self.memory.x[at + 3 : at + 6] = orbit.position, orbit.velocity
 
     def _look_into_blocks(self) -> None:
         self.truth = RobotState(0, self.block["truth"])
@@ -237,7 +235,7 @@ class Plant(RecordOwner):
         Events happen; faults begin and end.
         """
         self.change(tick)
-        if self.measures_truth and tick == 0:  # what `sense` would say, without compiled code
+        if self.measures_truth and tick == 0:  # as `sense` does, without loading compiled code
             self.state.block[:] = self.truth.block
         else:
             measure(self.block, tick, self.period)
@@ -256,6 +254,7 @@ class Plant(RecordOwner):
 
     def save(self) -> PlantSnapshot:
         """Copy all that the rest of the flight depends on, but the commands to come."""
+        # faults keep the sound numbers of what they have changed
         return PlantSnapshot(
             self.tick,
             self.block.copy(),
@@ -266,7 +265,7 @@ class Plant(RecordOwner):
         )
 
     def restore(self, snapshot: PlantSnapshot) -> None:
-        """Go back, or on, to the tick of a snapshot of this flight: from there the bits repeat."""
+        """Go to the tick of a snapshot of this flight: from there the bits repeat."""
         self.block[:] = snapshot.block
         self.command_delay_buffer[:] = snapshot.command_delay_buffer
         self.state.tick = self.truth.tick = snapshot.tick

@@ -24,11 +24,7 @@ def plant_description(
 ) -> dict[str, Any]:
     """Return what is flown, without time or machine: the same for the same settings.
 
-    Args:
-        robot: the plant's.
-        content: its numbers, for `Robot.from_dict`.
-        plant: made of both.
-        settings: of the plant's node.
+    ``content`` are the robot's numbers, for `Robot.from_dict`.
     """
     kinds = zip(robot.all_joint_names, robot.is_prismatic, strict=True)
     prismatic = [name for name, is_prismatic in kinds if is_prismatic]

@@ -35,7 +35,7 @@ class SimulationState(Enum):
 class Simulation:
     """Control of a node's plant: pause, step and reset.
 
-    All raise an `InputError` if the plant is not active.
+    All raise an `InputError` if the plant is not active, or what is asked for makes no sense then.
     """
 
     def __init__(self, node: ManagedNode[PlantNodeSettings]) -> None:
@@ -52,26 +52,22 @@ class Simulation:
         return SimulationState.PAUSED if self._loop.control.is_paused else SimulationState.PLAYING
 
     async def pause(self) -> str:
-        """Hold the plant at the present tick; return what to say of it."""
-        is_news = self._loop.control.pause()
-        return self._told(f"{'' if is_news else 'already '}paused at {self._now}")
+        """Hold the plant at the present tick; return the answer for the caller."""
+        has_changed = self._loop.control.pause()
+        return self._report(f"{'' if has_changed else 'already '}paused at {self._now}")
 
     async def resume(self) -> str:
-        """Let the plant run on; return what to say of it."""
-        is_news = self._loop.control.resume()
-        return self._told(f"{'goes on' if is_news else 'runs already'} at {self._now}")
+        """Let the plant run on; return the answer for the caller."""
+        has_changed = self._loop.control.resume()
+        return self._report(f"{'goes on' if has_changed else 'runs already'} at {self._now}")
 
     async def step(self, ticks: int) -> str:
-        """Go so many ticks on, and return what to say of it once the plant is held again.
-
-        Raises:
-            InputError: the simulation is stopped or not paused, or ``ticks`` is less than 1.
-            FlightError: something else has ended the step.
-        """
+        """Go ``ticks`` further; return the answer for the caller once the plant is held again."""
         loop = self._loop
         if self._is_stopped:
             raise InputError("the simulation is stopped: pause it before it is stepped")
         target = loop.control.step(ticks)
+        # a reset or a shutdown replaces the loop: then nobody would end this wait
         await until(lambda: loop.control.is_held or self._node.loop is not loop)
         reached = loop.control.tick
         if reached != target:
@@ -79,12 +75,7 @@ class Simulation:
         return f"stepped to {self._at(reached)}"
 
     async def reset(self, stop: bool = False) -> str:
-        """Take the graph back to its start, where it stays paused if it was, or is to ``stop``.
-
-        Raises:
-            InputError: the plant is not active, or being reset.
-            FlightError: a node of the graph could not be started anew.
-        """
+        """Take the graph back to its start, where it stays paused if it was, or is to ``stop``."""
         keep = self._loop.control.is_paused or stop
         settings = self._node.settings
         assert settings is not None
@@ -95,7 +86,7 @@ class Simulation:
             self._is_resetting = False
         if keep:
             self._loop.control.pause()
-        text = self._told(f"reset, {'paused' if keep else 'goes on'} at {self._now}")
+        text = self._report(f"reset, {'paused' if keep else 'goes on'} at {self._now}")
         self._is_stopped = stop
         return text
 
@@ -119,9 +110,9 @@ class Simulation:
         assert settings is not None
         return f"tick {tick} ({tick * settings.period:.4f} s)"
 
-    def _told(self, text: str) -> str:
+    def _report(self, text: str) -> str:
         self._is_stopped = False
-        self._loop.tell_paused()
+        self._loop.report_pause()
         self._node.log(text)
         return text
 
@@ -170,11 +161,7 @@ class StandardServices:
         self._simulation = simulation
         self._features, self._result, self._srv = msg.SimulatorFeatures, msg.Result, srv
         states = msg.SimulationState
-        self._numbers = {
-            SimulationState.STOPPED: states.STATE_STOPPED,
-            SimulationState.PLAYING: states.STATE_PLAYING,
-            SimulationState.PAUSED: states.STATE_PAUSED,
-        }
+        self._numbers = {s: getattr(states, f"STATE_{s.name}") for s in SimulationState}
 
     def get_features(self, request: Any, response: Any) -> Any:
         """Return the supported features."""
@@ -209,7 +196,8 @@ class StandardServices:
         return await self._answer(step, response, self._result.RESULT_OPERATION_FAILED)
 
     async def reset(self, request: Any, response: Any) -> Any:
-        """Reset time and state together: of a flight neither can be reset alone."""
+        """Reset time and state together."""
+        # a flight at tick 0 has one state, and its state one tick: neither can be reset alone
         kind = self._srv.ResetSimulation.Request
         both = kind.SCOPE_TIME | kind.SCOPE_STATE
         if request.scope != kind.SCOPE_DEFAULT and request.scope & both != both:

@@ -64,11 +64,7 @@ class FaultSettings(StrictModel):
         return any(fault.kind.name in MESSAGE_KINDS for fault in self.parsed_faults)
 
     def schedule(self, names: RobotNames, period: float) -> Schedule:
-        """Place the faults in a flight of a robot with these names in ticks of ``period`` seconds.
-
-        Raises:
-            InputError: a fault names what is not there, or its time holds no tick.
-        """
+        """Place the faults in ticks of ``period`` s, in a flight of a robot with these names."""
         return Schedule(self.parsed_faults, self.fault_seed, period, names)
 
 
@@ -203,13 +199,10 @@ class PlantNodeSettings(PlantSettings, NodeSettings):
 
     @classmethod
     def resolve(cls, overrides: Mapping[str, Any]) -> Self:
-        """Read the settings as `NodeSettings.resolve`; those of a table of disturbances, too.
-
-        Raises:
-            InputError: also if something is set that needs an orbit, without one.
-        """
+        """Read the settings as `NodeSettings.resolve`, and the file of a table of disturbances."""
         settings = super().resolve(overrides)
         settings.check_orbit(f"{cls.node} parameters")
+        # its numbers in place of its path: bags and nodes need no file
         return settings.with_table(table_text(settings.disturbance.table))
 
     def with_table(self, text: str) -> Self:
@@ -221,11 +214,7 @@ class PlantNodeSettings(PlantSettings, NodeSettings):
 
     @classmethod
     def read_layer(cls, path: Path, selected: Mapping[str, str]) -> Tree:
-        """Read a parameter file, a mission's document, or a trajectory.
-
-        Raises:
-            InputError: the file cannot be read, or a key in it is wrong.
-        """
+        """Read a parameter file, a mission's document, or a trajectory."""
         layer = mission_layer(path, cls.node, selected["robot"])
         disturbance = layer.get("disturbance")
         if isinstance(disturbance, dict) and isinstance(text := disturbance.get("table"), str):

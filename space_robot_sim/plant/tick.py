@@ -30,7 +30,7 @@ from ..environment.disturbance import begin_loads
 from ..environment.environment import Environment
 from ..environment.gravity_gradient import add_gravity_gradient
 from ..environment.orbit import density_at, light, magnetic_field, wind
-from ..environment.surfaces import press_on_surfaces
+from ..environment.surfaces import fill_surface_wrenches
 from ..sensors.sensors import Sensors, sense
 from .integrator import MOST_NUMBERS, Stages, first_motor_angle, first_orbit_number, integrate
 
@@ -40,13 +40,9 @@ Block = NDArray[Any]
 
 @kernel
 def write_truth(model: Model, x: Array, rotation: Array, truth: State) -> None:
-    """Write the plant's state into ``truth``; the torque in there is left alone.
+    """Write the plant's state ``x`` (see `Stages`) into ``truth``; the torque there is left alone.
 
-    Args:
-        model: of the plant's robot.
-        x: the state, see `space_robot_sim.plant.integrator.Stages`.
-        rotation: (3, 3) scratch.
-        truth: angular velocity on base axes.
+    ``rotation`` (3, 3) is scratch.
     """
     n, actuated = whole(model.joint_count), truth.joint_positions.size
     truth.base_position[:] = x[:3]
@@ -70,11 +66,11 @@ def write_truth(model: Model, x: Array, rotation: Array, truth: State) -> None:
 
 
 REPORT_TICKS = 20
-"""Ticks between two looks at the torque of gravity, which costs as much as a stage of the step."""
+"""Ticks between two reports of gravity's torque, which costs as much as a stage of the step."""
 
 
 @kernel
-def meet_surroundings(
+def update_surroundings(
     model: Model,
     environment: Environment,
     x: Array,
@@ -83,16 +79,9 @@ def meet_surroundings(
     period: float,
     truth: State,
 ) -> None:
-    """Find what acts over the tick that begins, and write it into ``truth``.
+    """Compute what acts over the tick that begins, and write it into ``truth``.
 
-    Args:
-        model: of the plant's robot.
-        environment: its orbit and surfaces; field and wrenches are written.
-        x: the state, see `space_robot_sim.plant.integrator.Stages`.
-        data: scratch.
-        tick: the tick.
-        period: s.
-        truth: with the base's attitude.
+    ``x`` and the attitude in ``truth`` are those of the tick; ``data`` is scratch.
     """
     orbit, surfaces = environment.orbit, environment.surfaces
     if uniform(orbit.is_on) == 0.0:
@@ -110,7 +99,7 @@ def meet_surroundings(
         store(wind(place, motion), orbit.wind, 0)
         density = density_at(orbit, np.sqrt(dot(place, place)))
         pressure = orbit.pressure * light(orbit, place)
-        press_on_surfaces(surfaces, model, orbit.wind, density, orbit.sun, pressure, data)
+        fill_surface_wrenches(surfaces, model, orbit.wind, density, orbit.sun, pressure, data)
         store(_about(com, surfaces.drag), torques, 3)
         store(_about(com, surfaces.sunlight), torques, 6)
     magnetic_field(orbit, position, tick * period, orbit.field)
@@ -121,6 +110,7 @@ def meet_surroundings(
     if uniform(orbit.has_gradient) != 0.0 and tick % REPORT_TICKS == 0:
         data.bias[: n + 1] = 0.0
         add_gravity_gradient(model, position, x[:3], orbit.has_j2, data)
+        # bias forces oppose what acts; about the base's CoM, then about the robot's
         moment, force = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
         for i in range(n + 1):
             moment = subtract(moment, vector(data.bias[i], 0))
@@ -245,7 +235,7 @@ def begin_interval(
 def write_true_state(memory: PlantMemory, tick: int, period: float) -> None:
     """Write the true state of ``tick``, and what the robot meets there."""
     write_truth(memory.model, memory.x, memory.rotation, memory.truth)
-    meet_surroundings(
+    update_surroundings(
         memory.model, memory.environment, memory.x, memory.stages.data, tick, period, memory.truth
     )
 
@@ -263,6 +253,6 @@ def fastest_rate(model: Model, x: Array) -> float:
     """Return the fastest rate of base axes, joints, wheels and motors, rad/s (NaN if any is)."""
     fastest = 0.0
     for i in range(10 + whole(model.joint_count), first_motor_angle(model)):
-        speed = abs(x[i])  # NaN stays
+        speed = abs(x[i])  # a NaN stays: it compares as false
         fastest = where((speed <= fastest) | np.isnan(fastest), fastest, speed)
     return fastest

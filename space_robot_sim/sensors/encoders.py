@@ -1,6 +1,6 @@
 """Joint encoders: angle in whole steps, rate measured or differenced.
 
-The angle of a prismatic joint is its position; m stands in the place of rad there.
+The angle of a prismatic joint is its position, in m in place of rad.
 """
 
 from __future__ import annotations
@@ -117,11 +117,12 @@ def read_encoders(
     for i in range(now.size):
         true_angle, true_rate = truth.joint_positions[i], truth.joint_velocities[i]
         motor = whole(encoders.motor[i])
-        if motor > 0:
+        if motor > 0:  # seen through the gear: angle and rate are in the link's units
             true_angle = truth.motor_positions[motor - 1]
             true_rate = truth.motor_velocities[motor - 1]
         angle = true_angle + encoders.sigma[i] * draws[0, i]
         angle = in_steps(angle, encoders.step[i])
+        # of the quantised angle, so that a differenced rate comes in whole steps, too
         rate = (angle - then[i]) / (lag * period) if lag > 0 else true_rate
         rate = in_steps(rate + encoders.velocity_sigma[i] * draws[1, i], encoders.velocity_step[i])
         is_stuck = encoders.stuck[i] == 1.0
@@ -132,7 +133,7 @@ def read_encoders(
 
 
 @kernel
-def see_motors(encoders: Encoders, truth: State, measured: State) -> None:
+def read_motors(encoders: Encoders, truth: State, measured: State) -> None:
     """Write angles and rates of the motors for joints whose encoders are on the motor's side."""
     for i in range(measured.joint_positions.size):
         motor = whole(encoders.motor[i])

@@ -65,7 +65,9 @@ def read_gyro(gyro: Gyro, truth: State, tick: int, period: float, measured: Stat
     """Write the measured rate of the base into ``measured``; the bias walks from tick to tick."""
     draws = gyro.draws[tick % BLOCK_TICKS]
     sigma_v, sigma_u = gyro.angle_random_walk, gyro.rate_random_walk
+    # of the mean rate over a period: white noise, and the bias that walks within it
     white = sigma_v * sigma_v / period + sigma_u * sigma_u * period / 12.0
+    # no sample before tick 0 from which the bias could have walked
     walk = sigma_u * np.sqrt(period) if tick > 0 else 0.0
     for i in range(3):
         before = gyro.bias[i]

@@ -16,7 +16,7 @@ from space_robot_msgs_py.samples import State
 
 from ..component import Component
 from ..faults.schedule import BLOCK_TICKS
-from .encoders import Encoders, read_encoders, see_motors
+from .encoders import Encoders, read_encoders, read_motors
 from .gyro import Gyro, read_gyro
 from .magnetometer import Magnetometer, read_magnetometer
 from .star_tracker import StarTracker, track_stars
@@ -73,11 +73,12 @@ def sense(sensors: Sensors, truth: State, tick: int, period: float, measured: St
     measured.magnetic_field[:] = truth.magnetic_field
     measured.external_torques[:] = truth.external_torques
     if uniform(sensors.are_ideal) == 1.0:
+        # no random number is drawn, and no arithmetic changes a bit
         measured.quaternion[:] = truth.quaternion
         measured.omega_base[:] = truth.omega_base
         measured.joint_positions[:] = truth.joint_positions
         measured.joint_velocities[:] = truth.joint_velocities
-        see_motors(sensors.encoders, truth, measured)
+        read_motors(sensors.encoders, truth, measured)
     else:
         _draw(sensors, tick)
         track_stars(sensors.star_tracker, truth, tick, measured)

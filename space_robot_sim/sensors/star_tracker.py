@@ -7,6 +7,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from space_robot_model.dynamics.attitude import four, multiply
 from space_robot_model.elementary.functions import in_steps, sin_cos
 from space_robot_model.elementary.matrices import norm
 from space_robot_model.elementary.rotations import plain_sin_cos
@@ -67,7 +68,7 @@ class StarTracker(Component):
     draws: Array = shaped(lambda n: (BLOCK_TICKS, 3))
     """Standard normal numbers, a row a tick."""
     taken: Array = shaped(lambda n: (MOST_UNDER_WAY,))
-    """1 for each measurement under way that could be taken."""
+    """1 for each measurement in transit that could be taken."""
     under_way: Array = shaped(lambda n: (MOST_UNDER_WAY, 4))
     """Measurements in transit, by number modulo `MOST_UNDER_WAY`."""
     held: Array = shaped(lambda n: (4,), source=_before)
@@ -103,8 +104,8 @@ def track_stars(tracker: StarTracker, truth: State, tick: int, measured: State) 
     """Write the attitude released last at ``tick`` into ``measured``.
 
     Measurement k shows the attitude of tick ``k interval``, is released ``delay`` ticks later and
-    held until the next one; while the tracker is blind, none is taken. The one that is there at
-    tick 0 shows the attitude that stands in ``held`` before.
+    held until the next one; while the tracker is blind, none is taken. At tick 0 it shows the
+    attitude that ``held`` has before.
     """
     interval, delay = whole(tracker.interval), whole(tracker.delay)
     if tick % interval == 0:
@@ -112,6 +113,7 @@ def track_stars(tracker: StarTracker, truth: State, tick: int, measured: State) 
         tracker.taken[place] = 1.0 - tracker.blind[0]
         draws = tracker.draws[tick % BLOCK_TICKS]
         if tick == 0:
+            # a tracker that has been on for long holds a measurement from before the flight
             expose(tracker, tracker.held, draws, tracker.under_way[place])
             _release(tracker, place)
         expose(tracker, truth.quaternion, draws, tracker.under_way[place])
@@ -136,18 +138,16 @@ def expose(tracker: StarTracker, quaternion: Array, draws: Array, out: Array) ->
     x = across * draws[0] + (about - across) * along * boresight[0]
     y = across * draws[1] + (about - across) * along * boresight[1]
     z = across * draws[2] + (about - across) * along * boresight[2]
-    a, b, c, d = quaternion[0], quaternion[1], quaternion[2], quaternion[3]
     angle = np.sqrt(x * x + y * y + z * z)
     is_turned = angle > 0.0  # by the quaternion of the rotation x, y, z
     sine, cosine = sin_cos(0.5 * angle)
     sine /= where(is_turned, angle, 1.0)
-    x, y, z = sine * x, sine * y, sine * z
-    out[0] = where(is_turned, a * cosine - b * x - c * y - d * z, a)
-    out[1] = where(is_turned, a * x + b * cosine + c * z - d * y, b)
-    out[2] = where(is_turned, a * y + c * cosine + d * x - b * z, c)
-    out[3] = where(is_turned, a * z + d * cosine + b * y - c * x, d)
+    # the noise turns about the base's axes: q (x) noise
+    turned = multiply(four(quaternion), (cosine, sine * x, sine * y, sine * z))
+    out[0], out[1], out[2], out[3] = where(is_turned, turned, four(quaternion))
     step = 0.5 * tracker.step[0]
     if any_lane(step > 0.0):
+        # rounded numbers are no unit quaternion any more
         for i in range(4):
             out[i] = in_steps(out[i], step)
         length = np.sqrt(out[0] * out[0] + out[1] * out[1] + out[2] * out[2] + out[3] * out[3])

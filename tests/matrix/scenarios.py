@@ -46,7 +46,7 @@ GROUPS = {
     "reference": ("reference_joints", "reference_base"),
     "law": ("telemetry", "assumed_error"),
 }
-"""Signals by what they tell of; measured ones are the group ``measured``."""
+"""Signals by what they tell of; measured ones are the group ``measured``, others ``further``."""
 
 
 @dataclass
@@ -169,7 +169,7 @@ def group_of(name: str) -> str:
     """Return the group of a signal."""
     if name.startswith("measured."):
         return "measured"
-    return next(group for group, names in GROUPS.items() if name in names)
+    return next((group for group, names in GROUPS.items() if name in names), "further")
 
 
 def what_changed(now: Mapping[str, Any], stored: Mapping[str, Any]) -> str:

@@ -16,7 +16,7 @@ from space_robot.scenario.faults import KINDS, PROCESS_KINDS
 from space_robot.scenario.option_table import names
 from space_robot_control.guidance.goals import GoalFrame, Point
 from space_robot_control.guidance.segments import (
-    KINDS_OF_BASE,
+    BASE_KINDS,
     SEGMENT_KINDS,
     Segment,
     ToolSegment,
@@ -133,7 +133,7 @@ def test_every_kind_of_segment_is_flown() -> None:
     assert {tool.least for tool in tools} == {"motion", "momentum"}
     bases = [s.base for s in segments if s.base and not s.is_base_free]
     bases += [read_pointing(s.base_point, "start") for s in settings if s.base_point.strip()]
-    assert lacking(KINDS_OF_BASE.values(), map(type, bases)) == []
+    assert lacking(BASE_KINDS.values(), map(type, bases)) == []
     assert lacking(get_args(Point), (getattr(base, "point", "") for base in bases)) == []
 
 

@@ -22,7 +22,7 @@ from space_robot_msgs_py.wire.telemetry import ClockCodec
 pytest.importorskip("rclpy")
 
 from space_robot_msgs_py import recorder_node
-from space_robot_msgs_py.recorder_node import LOOK_PERIOD_S, REPORTS, TIMEOUT_S, TURN, RecorderLoop
+from space_robot_msgs_py.recorder_node import CHECK_PERIOD_S, REPORTS, TIMEOUT_S, TURN, RecorderLoop
 from space_robot_msgs_py.ros.endpoints import Received
 from space_robot_msgs_py.ros.loop import SENT, Level, Wait
 
@@ -254,7 +254,7 @@ def test_optional_topics_are_looked_for_now_and_then(loop: RecorderLoop, node: N
     assert node.looks == len(OPTIONAL)
     node.published.add(f"/sat1/{topics.WHEELS_STATE.name}")
     for looks in (2 * len(OPTIONAL), 3 * len(OPTIONAL) - 1):  # one that is heard is not looked for
-        time.sleep(LOOK_PERIOD_S)
+        time.sleep(CHECK_PERIOD_S)
         rounds(loop)
         assert node.looks == looks
         assert topics.WHEELS_STATE in node.queues

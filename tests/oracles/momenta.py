@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from strategies import State
 
 from oracles import pinocchio_model, pinocchio_state, rotation_of, visited
-from space_robot_model.hardware.wheels import WheelSettings
+from space_robot_model.hardware.base_actuators import WheelSettings
 from space_robot_model.robot import Robot
 from space_robot_msgs_py.samples import RobotState
 

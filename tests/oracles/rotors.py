@@ -22,7 +22,7 @@ from oracles import (
     to_base_axes,
     visited,
 )
-from space_robot_model.hardware.wheels import WheelSettings
+from space_robot_model.hardware.base_actuators import WheelSettings
 from space_robot_model.robot import Robot
 from space_robot_model.robot.gears import geared_joints
 from space_robot_model.robot.parts import Gear

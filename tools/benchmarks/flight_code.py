@@ -20,7 +20,7 @@ from space_robot.export.software import export
 from space_robot_control.controller.supervisor import Supervisor
 from space_robot_control.flight_code.c99.program import CALL, Function
 from space_robot_control.flight_code.folder import FLAGS, Exported
-from space_robot_control.flight_code.library import build_library, fill_measurement, write_sources
+from space_robot_control.flight_code.instances import build_library, fill_measurement, write_sources
 from space_robot_control.laws import CompiledLaw, laws
 from space_robot_msgs_py.samples import Reference
 

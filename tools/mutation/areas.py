@@ -46,7 +46,7 @@ MORE: dict[str, tuple[str, ...]] = {
     "batch": ("laboratory/api/*.py",),
     "flight": ("laboratory/api/*.py",),
     "scenario": ("laboratory/api/*.py", "laboratory/flight/test_*.py"),
-    "cli": ("test_start_up.py",),
+    "cli": ("test_start_up.py", "laboratory/campaign/test_*report*.py"),
     "help": ("laboratory/cli/test_*help*.py",),
     "console": ("laboratory/cli/test_*output*.py",),
     "tuning": ("laboratory/cli/test_*gains*.py",),
@@ -55,6 +55,7 @@ MORE: dict[str, tuple[str, ...]] = {
 """Tests of an area beside those of its own folder."""
 FURTHER = (
     "matrix/**/*.py",
+    "outputs/**/*.py",
     "test_reference.py",
     "test_start_up.py",
     "laboratory/cli/test_*output*.py",
@@ -62,7 +63,7 @@ FURTHER = (
     GRAPHS,
 )
 """Flights by all ways, pages made from the code, commands with their output, nodes."""
-WITH_ROS = ("sim", "control", "laboratory", "ros", "graph", "replay", "guidance")
+WITH_ROS = ("sim", "control", "laboratory", "ros", "graph", "replay", "guidance", "view")
 QUICK, NO_ROS = "not ros and not slow", "not ros"
 
 

@@ -8,9 +8,11 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
-from space_robot_model.hardware.base_actuators import BaseActuatorSettings
-from space_robot_model.hardware.thrusters import ThrusterSettings
-from space_robot_model.hardware.wheels import WheelSettings
+from space_robot_model.hardware.base_actuators import (
+    BaseActuatorSettings,
+    ThrusterSettings,
+    WheelSettings,
+)
 from space_robot_msgs_py.bag.flight_log import FlightLog
 
 from ..errors import attitude_angles

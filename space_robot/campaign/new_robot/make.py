@@ -13,11 +13,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from space_robot_control.controller.settings import DEFAULT_SETS, OF_THE_SET
+from space_robot_control.controller.settings import DEFAULT_SETS, OF_THE_SET, OTHERS
 from space_robot_control.guidance.limits import MissionLimits
 from space_robot_control.guidance.mission import MissionSettings
 from space_robot_control.guidance.segments import read_segments
-from space_robot_control.laws import laws
 from space_robot_model.robot import Robot
 from space_robot_model.robot.description import unit_remarks
 from space_robot_model.robot.files import is_urdf, read_content
@@ -208,9 +207,9 @@ def make_robot(
         (place / OWN_MISSION).write_text(mission_text(robot, mission, command), "utf-8")
         tuned = tuned_set({"robot": str(place)}, [CASE], WISHES, step)
         write_set(tuned, command, place / OWN_GAINS / SET)
-        default = "".join(f"{law}: {SET}\n" for law in tuned.gains)
-        (place / OWN_GAINS / DEFAULT_SETS).write_text(f"# The set of each law.\n{default}", "utf-8")
-        names = sorted(laws())
+        default = f"# The set of each law.\n{OTHERS}: {SET}\n"
+        (place / OWN_GAINS / DEFAULT_SETS).write_text(default, "utf-8")
+        names = sorted(tuned.gains)
         step(f"flying {', '.join(names)}")
         flights = dict(zip(names, run_all(partial(_fly, place), names, cores()), strict=True))
         best = min(names, key=lambda law: flights[law].score)

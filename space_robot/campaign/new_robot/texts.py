@@ -11,9 +11,8 @@ import yaml
 from space_robot_model.robot import Robot
 from space_robot_model.robot.files import is_urdf, read_content
 from space_robot_model.robot.find import ROBOT_STEM, URDF
-from space_robot_model.robot.urdf import UrdfRobot
+from space_robot_model.robot.urdf import Mount, UrdfRobot, mounted_urdf
 from space_robot_model.robot.urdf_links import with_absolute_meshes
-from space_robot_model.robot.urdf_mount import Mount, mounted_urdf
 from space_robot_msgs_py.config.validation import one_of, read_yaml
 from space_robot_msgs_py.config.yaml_text import read_file
 from space_robot_msgs_py.errors import InputError

@@ -9,17 +9,17 @@ from numba import types
 
 from space_robot_control.controller.signals import ControllerMemory, compute_signals
 from space_robot_control.controller.tick import apply_transfer
-from space_robot_control.laws import CompiledLaw, laws
+from space_robot_control.laws import CompiledLaw
 from space_robot_msgs_py.compiled.lane_type import MASK, array_of_lanes
 from space_robot_msgs_py.compiled.lanes import WIDTH
 from space_robot_msgs_py.compiled.record_type import block_type, record_type
 from space_robot_msgs_py.ros.process import hold_to_standard_input, module_command
-from space_robot_msgs_py.samples import Reference, State
+from space_robot_msgs_py.samples import State
 from space_robot_sim.plant.lanes import advance_lanes
 from space_robot_sim.plant.tick import PlantMemory
 
 from ...processes.child_process import child_process
-from ..compilation import compile_kernels, compiling, mark_of
+from ..compilation import compile_kernels, compiling, laws_with_gains, mark_of
 from ..plan import Flight, FlightPlan, resolve
 from .batch import FlightBatch
 from .bench_loop import fly_benches
@@ -41,7 +41,7 @@ def compile_lanes() -> None:
     mark = mark_of(MARK)
     if mark.exists():
         return
-    own = [law.kernel for law in laws().values() if issubclass(law, CompiledLaw)]
+    own = [law.kernel for law in laws_with_gains().values() if issubclass(law, CompiledLaw)]
     kernels = (fly_lanes, measure_lanes, fly_benches, *own)
     with compiling("flights that fly together", *kernels, again=True):
         with child_process(module_command(__name__)) as helper:
@@ -69,17 +69,15 @@ def _compile_controllers() -> None:
     """Compile the controller's kernels in lanes."""
     controller, row = _block(ControllerMemory), array_of_lanes(1)
     signals: Any = compute_signals
-    inputs = _block(State), _block(Reference)
-    signals.compile(
-        (controller, types.intp, *inputs, row, types.intp, types.boolean, types.float64)
-    )
+    of_law = row, types.intp, types.boolean
+    signals.compile((controller, types.intp, _block(State), *of_law, types.float64))
     transfer: Any = apply_transfer
     transfer.compile((controller, types.intp, row, row))
 
 
 def _fly_all_laws() -> None:
     """Fly a few ticks under every law with a kernel, and one on a bench."""
-    for name, law in laws().items():
+    for name, law in laws_with_gains().items():
         if issubclass(law, CompiledLaw):
             plan = FlightPlan(controller=name, duration=0.002)
             for _ in FlightBatch([Flight(resolve(plan)) for _ in range(2)]).fly():

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from space_robot_control.controller.signals import USABLE, compute_signals
+from space_robot_control.controller.signals import USABLE, compute_signals, copy_reference
 from space_robot_control.controller.tick import apply_transfer
 from space_robot_control.laws.base import LawCode
 from space_robot_model.dynamics.rho_space import force_for
@@ -136,15 +136,9 @@ def fly_lanes(
         if log.measured[0].shape[1] > 0:
             _log_state(log.measured, k, log.places[1], memory.plants.numbers)
         _refer(references, k, memory.reference_numbers)
+        copy_reference(memory.reference[0], signals.reference)
         status = compute_signals(
-            controllers,
-            tick,
-            memory.measured,
-            memory.reference,
-            h_bar,
-            law.estimate,
-            law.uses_model,
-            period,
+            controllers, tick, memory.measured, h_bar, law.estimate, law.uses_model, period
         )
         is_flying = flies[0] == 1.0
         statuses[0] = where(is_flying, status, statuses[0])

@@ -10,15 +10,14 @@ from typing import Any
 import yaml
 
 from space_robot_control.allocation.settings import assumed_actuators
-from space_robot_control.controller.gains import (
-    build_law,
-    build_laws,
+from space_robot_control.controller.gains import build_law, build_laws, split_gains
+from space_robot_control.controller.law_choice import NoLaw, parse_swaps
+from space_robot_control.controller.settings import (
+    DEFAULT,
+    ControllerNodeSettings,
     gain_files,
     gains_as_path,
-    split_gains,
 )
-from space_robot_control.controller.law_choice import NoLaw, parse_swaps
-from space_robot_control.controller.settings import DEFAULT, ControllerNodeSettings
 from space_robot_control.laws import ControlLaw, find_law
 from space_robot_control.laws.names import is_plain, require_shipped_file, require_shipped_law
 from space_robot_model.robot import Robot

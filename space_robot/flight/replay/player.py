@@ -56,15 +56,15 @@ class Player:
             PolledCallbackGroup,
             RawPublisher,
             RawSubscription,
-            Waiter,
         )
+        from space_robot_msgs_py.ros.rclpy_internals import SubscriptionWaiter
 
         self._visitor = TemporaryNode("replay_node", domain)
         self.node = self._visitor.node
         self._outs = {t.name: RawPublisher(self.node, t) for t in (*parts, *REFERENCES)}
         self._parts_out = [self._outs[topic.name] for topic in parts]
         self._commands = RawSubscription(self.node, topics.COMMAND, PolledCallbackGroup())
-        self._waiter = Waiter(self.node)
+        self._waiter = SubscriptionWaiter(self.node.context)
         self._answers = answers
         self._references: list[_Stream] = []
         self._played = array("q")
@@ -199,7 +199,7 @@ class Player:
         while True:
             data = self._commands.take()
             if data is None:
-                self._waiter.wait((self._commands,), POLL_S)
+                self._waiter.wait((self._commands.handle,), POLL_S)
                 data = self._commands.take()
             if data is not None:
                 if self._answers.add(data) == state.tick:
@@ -220,5 +220,5 @@ class Player:
             left = moment - time.perf_counter()
             if left <= 0.0:
                 return
-            self._waiter.wait((self._commands,), min(left, POLL_S))
+            self._waiter.wait((self._commands.handle,), min(left, POLL_S))
             self.check()

@@ -6,9 +6,8 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
+from space_robot_control.controller.settings import DEFAULT, gain_files
 from space_robot_control.navigation.settings import NavigationMode
-from space_robot_msgs_py.config.installation import config_directory
-from space_robot_msgs_py.config.validation import read_yaml
 from space_robot_msgs_py.errors import DivergedError, InputError
 
 from ...analysis.figures import control_results
@@ -72,8 +71,7 @@ class TableRow:
     @property
     def shown(self) -> Variant:
         """The variant that is drawn: default gains, printed friction."""
-        sets = read_yaml(config_directory() / "gains" / ROBOT / "default_sets.yaml")
-        return Variant(sets[self.controller], True)
+        return Variant(gain_files(ROBOT, DEFAULT)[self.controller].parent.name, True)
 
 
 ROWS = tuple(TableRow(controller, case) for controller, case in PRINTED)

@@ -52,7 +52,7 @@ def reproduce(
     duration: float | None = None,
     brief: bool = False,
     equipment: Equipment = PERFECT,
-    jobs: int = 1,
+    jobs: int,
     progress: Callable[[int], Callable[[], None]] = lambda total: lambda: None,
 ) -> dict[str, Any]:
     """Fly ``rows`` and write table, figures and report into ``folder``.

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.config.validation import full_namespace
-from space_robot_msgs_py.ros.locks import newest_node, nodes_in
+from space_robot_msgs_py.ros.locks import living_nodes, nodes_in
 
 from ...flight.graph.domain import domain_asked_for
 from ...flight.graph.node_names import PLANT
@@ -54,7 +54,7 @@ class Finder:
         if self._domain is not None:
             places = sorted(self._publishing())
             return FlightPlace(self._domain, places[0]) if places else None
-        newest = newest_node(PLANT, self._namespace)
+        newest = next(living_nodes(PLANT, self._namespace), None)
         return FlightPlace(*newest) if newest else None
 
     def describe(self) -> str:

@@ -88,7 +88,7 @@ class Listener:
             self.close()
             raise
         self._timebase = Timebase(round(period * 1e9))
-        self._names = RobotNames.of(self.robot.joint_names, passive=self.robot.passive_names)
+        self._names = RobotNames(self.robot.joint_names, passive=self.robot.passive_names)
         for topic in self._topics.values():
             topic.describe(self._names, self._timebase)
         self._hardware_names = self.actuators.robot_names(self.robot)

@@ -1,122 +1,31 @@
-"""Expressions of kernels as expressions of C.
-
-The functions that kernels may call beside one another are exact in IEEE arithmetic, so C's library
-cannot differ: square root, remainder, rounding to an integer, sign. Where Python, Numba and C
-differ (minimum and maximum of NaN, the sign of an integer division, an integer from a large float)
-``templates/kernels.h.j2`` has what Numba does.
-"""
+"""Expressions of kernels as expressions of C."""
 
 from __future__ import annotations
 
 import ast
 import builtins
-import math
 import operator
 from collections.abc import Callable
 from dataclasses import replace
-from functools import reduce
 from types import ModuleType
 from typing import Any
 
-import numpy as np
-
-from space_robot_msgs_py.compiled import lanes
 from space_robot_msgs_py.compiled.records import Field as RecordField
 
 from . import language as lang
-from .language import ArrayOf, Known, Pointer, RefusedError, Value, cast, number_of
+from .language import (
+    WORDS,
+    ArrayOf,
+    Known,
+    Pointer,
+    RefusedError,
+    Value,
+    cast,
+    chosen,
+    negated,
+    number_of,
+)
 
-Word = Callable[[tuple[Value, ...]], Value]
-
-
-def _exact(name: str, kind: Any = lang.FLOAT) -> Word:
-    def word(arguments: tuple[Value, ...]) -> Value:
-        texts = ", ".join(cast(argument, lang.FLOAT).text for argument in arguments)
-        return Value(kind, f"{name}({texts})", lang.ATOM, calls=max(a.calls for a in arguments))
-
-    return word
-
-
-def _absolute(arguments: tuple[Value, ...]) -> Value:
-    if arguments[0].type != lang.FLOAT:
-        raise RefusedError("abs() of an integer", "write a conditional expression")
-    return _exact("fabs")(arguments)
-
-
-def _extreme(name: str) -> Word:
-    def word(arguments: tuple[Value, ...]) -> Value:
-        kind = reduce(lang.joined, (argument.type for argument in arguments))
-        calls = max(argument.calls for argument in arguments)
-        pair = Value(kind, f"{name}{'_int' if kind == lang.INT else ''}", calls=calls)
-        values = [cast(argument, kind) for argument in arguments]
-        if all(value.constant is not None for value in values):
-            function = max if name == "py_max" else min
-            return number_of(function(value.constant for value in values))
-        return reduce(lambda a, b: replace(pair, text=f"{pair.text}({a.text}, {b.text})"), values)
-
-    return word
-
-
-def _integer(arguments: tuple[Value, ...]) -> Value:
-    (value,) = arguments
-    if value.type == lang.INT:
-        return value
-    if value.constant is not None:
-        return number_of(int(value.constant))
-    if value.type == lang.BOOL:
-        return cast(value, lang.INT)
-    return replace(value, type=lang.INT, text=f"py_int({value.text})", rank=lang.ATOM)
-
-
-def negated(arguments: tuple[Value, ...]) -> Value:
-    """Return ``not x``."""
-    value = cast(arguments[0], lang.BOOL)
-    constant = None if value.constant is None else not value.constant
-    return replace(value, text=f"!{value.at(lang.UNARY)}", rank=lang.UNARY, constant=constant)
-
-
-def chosen(arguments: tuple[Value, ...]) -> Value:
-    """Return ``then if condition else otherwise``."""
-    condition, then, otherwise = arguments
-    condition = cast(condition, lang.BOOL)
-    kind = lang.joined(then.type, otherwise.type)
-    if not isinstance(kind, lang.TupleOf):
-        then, otherwise = cast(then, kind), cast(otherwise, kind)
-    if condition.constant is not None:
-        return then if condition.constant else otherwise
-    if then.text == otherwise.text:
-        return then
-    calls = max(condition.calls, then.calls, otherwise.calls)
-    both = f"{then.at(lang.TERNARY + 1)} : {otherwise.at(lang.TERNARY + 1)}"
-    text = f"{condition.at(lang.UNARY)} ? {both}"
-    return Value(kind, text, lang.TERNARY, calls=calls)
-
-
-WORDS: dict[Any, Word] = {
-    abs: _absolute,
-    min: _extreme("py_min"),
-    max: _extreme("py_max"),
-    int: _integer,
-    float: lambda a: cast(a[0], lang.FLOAT),
-    bool: lambda a: cast(a[0], lang.BOOL),
-    math.sqrt: _exact("sqrt"),
-    np.sqrt: _exact("sqrt"),
-    np.floor: _exact("floor"),
-    np.fmod: _exact("fmod"),
-    math.copysign: _exact("copysign"),
-    np.copysign: _exact("copysign"),
-    np.sign: _exact("py_sign"),
-    np.isfinite: _exact("py_isfinite", lang.BOOL),
-    np.isnan: _exact("py_isnan", lang.BOOL),
-    math.isnan: _exact("py_isnan", lang.BOOL),
-    lanes.where: chosen,
-    lanes.uniform: lambda a: a[0],
-    lanes.whole: _integer,
-    lanes.any_lane: lambda a: cast(a[0], lang.BOOL),
-    lanes.all_lanes: lambda a: cast(a[0], lang.BOOL),
-    lanes.negated: negated,
-}
-"""Functions that kernels may call beside one another."""
 ARITHMETIC: dict[type[ast.operator], tuple[str, int, Callable[[Any, Any], Any]]] = {
     ast.Add: ("+", lang.SUM, operator.add),
     ast.Sub: ("-", lang.SUM, operator.sub),
@@ -149,11 +58,7 @@ class Expressions:
         """Conditions, as dumped syntax, that are known in a part of the function."""
 
     def translate(self, node: ast.expr) -> Value:
-        """Return the value of an expression.
-
-        Raises:
-            RefusedError: it is not of the language.
-        """
+        """Return the value of an expression; `RefusedError` if it is not of the language."""
         if self.facts and (known := self.facts.get(ast.dump(node))) is not None:
             return number_of(known)
         method = getattr(self, f"_{type(node).__name__.lower()}", None)
@@ -173,6 +78,7 @@ class Expressions:
         if node.id in self.names:
             return self.names[node.id]
         module = self.function.__globals__
+        # capacities of arrays: Python's are for any robot, C's are exact
         if node.id in self.program.sizes and node.id in module:
             return number_of(self.program.sizes[node.id])
         if node.id in module:
@@ -183,6 +89,7 @@ class Expressions:
         if isinstance(value, bool):
             return number_of(value)
         if isinstance(value, (float, int)):
+            # its number is known, but C reads it by its name, too
             text = self.program.named(self.function.__module__, name, value)
             return replace(number_of(value), text=text, rank=lang.ATOM)
         return Value(Known(value), name)
@@ -224,11 +131,7 @@ class Expressions:
 
     @staticmethod
     def length(array: Value) -> Value:
-        """Return the length of an array.
-
-        Raises:
-            RefusedError: it is not known when the code is exported.
-        """
+        """Return the length of an array, which must be known when the code is exported."""
         length = array.type.shape[0]
         if length is None:
             raise RefusedError("the length of a slice with variable ends", "give it as an argument")
@@ -327,10 +230,7 @@ class Expressions:
         return replace(value, text=text, rank=lang.UNARY, constant=constant)
 
     def _binop(self, node: ast.BinOp) -> Value:
-        return self.operation(node.op, self.translate(node.left), self.translate(node.right))
-
-    def operation(self, op: ast.operator, left: Value, right: Value) -> Value:
-        """Return ``left op right``."""
+        op, left, right = node.op, self.translate(node.left), self.translate(node.right)
         lang.check_order((left, right))
         calls = max(left.calls, right.calls)
         if isinstance(op, (ast.BitAnd, ast.BitOr)):
@@ -352,13 +252,14 @@ class Expressions:
             return left
         if kind == lang.INT and sign == "+" and left.constant == 0:
             return right
-        if sign == "<<":
+        if sign == "<<":  # a plain literal is an int, of 32 bits
             left = replace(left, text=f"INT64_C({left.text})") if left.text.isdigit() else left
         if rank == lang.ATOM:
             if kind != lang.INT:
                 raise RefusedError("a remainder of floats", "use np.floor")
             text = f"{sign}({left.text}, {right.text})"
         else:
+            # (a - b) - c needs no parentheses, a - (b - c) keeps them: roundings stay in order
             text = f"{left.at(rank)} {sign} {right.at(rank + 1)}"
         return Value(kind, text, rank, constant, calls=calls)
 

@@ -1,12 +1,22 @@
-"""Types and values of the kernels' language, and how they are written in C."""
+"""Types, values and functions of the kernels' language, and how they are written in C.
+
+The functions that kernels may call beside one another are exact in IEEE arithmetic, so C's library
+cannot differ: square root, remainder, rounding to an integer, sign. Where Python, Numba and C
+differ (minimum and maximum of NaN, the sign of an integer division, an integer from a large float)
+``templates/kernels.h.j2`` has what Numba does.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
+from functools import reduce
 from typing import Any, NamedTuple
 
+import numpy as np
+
+from space_robot_msgs_py.compiled import lanes
 from space_robot_msgs_py.compiled.records import Record
 from space_robot_msgs_py.errors import InputError
 
@@ -21,17 +31,17 @@ TERNARY, OR, AND, BITS, EQUAL, RELATION, SHIFT, SUM, PRODUCT, UNARY, POSTFIX, AT
 class NotInSubsetError(InputError):
     """A construct that has no translation to C."""
 
-    def __init__(self, file: str, line: int, what: str, instead: str) -> None:
+    def __init__(self, file: str, line: int, construct: str, instead: str) -> None:
         """Name the place, the construct, and what to write instead."""
-        super().__init__(f"{file}, line {line}: {what} cannot be exported as C: {instead}")
+        super().__init__(f"{file}, line {line}: {construct} cannot be exported as C: {instead}")
 
 
 class RefusedError(Exception):
     """A construct is refused; the place is added by the caller who knows it."""
 
-    def __init__(self, what: str, instead: str) -> None:
-        super().__init__(what)
-        self.what, self.instead = what, instead
+    def __init__(self, construct: str, instead: str) -> None:
+        super().__init__(construct)
+        self.construct, self.instead = construct, instead
 
 
 @dataclass(frozen=True)
@@ -189,7 +199,7 @@ def literal(number: float) -> str:
         return "(double)NAN"
     if math.isinf(number):
         return "(double)INFINITY" if number > 0 else "-(double)INFINITY"
-    text = repr(float(number))
+    text = repr(float(number))  # the shortest text that reads back as the same bits
     return text if any(c in text for c in ".e") else f"{text}.0"
 
 
@@ -244,6 +254,7 @@ def joined(one: Type, other: Type) -> Type:
         return other
     if {one, other} <= {FLOAT, INT}:
         return FLOAT
+    # arrays of different lengths: a pointer to the first row fits both
     are_arrays = isinstance(one, ArrayOf) and isinstance(other, ArrayOf)
     if are_arrays and one.shape[1:] == other.shape[1:]:
         return ArrayOf((None, *one.shape[1:]))
@@ -260,3 +271,96 @@ def described(kind: Type) -> str:
         return f"the Python object {getattr(kind.value, '__name__', kind.value)!r}"
     words_of = {TupleOf: "a tuple", ArrayOf: "an array", Pointer: "a record", BlockOf: "a block"}
     return words_of.get(type(kind), "a named tuple")
+
+
+Word = Callable[[tuple[Value, ...]], Value]
+
+
+def _exact(name: str, kind: Any = FLOAT) -> Word:
+    def word(arguments: tuple[Value, ...]) -> Value:
+        texts = ", ".join(cast(argument, FLOAT).text for argument in arguments)
+        return Value(kind, f"{name}({texts})", ATOM, calls=max(a.calls for a in arguments))
+
+    return word
+
+
+def _absolute(arguments: tuple[Value, ...]) -> Value:
+    if arguments[0].type != FLOAT:
+        raise RefusedError("abs() of an integer", "write a conditional expression")
+    return _exact("fabs")(arguments)
+
+
+def _extreme(name: str) -> Word:
+    def word(arguments: tuple[Value, ...]) -> Value:
+        kind = reduce(joined, (argument.type for argument in arguments))
+        calls = max(argument.calls for argument in arguments)
+        pair = Value(kind, f"{name}{'_int' if kind == INT else ''}", calls=calls)
+        values = [cast(argument, kind) for argument in arguments]
+        if all(value.constant is not None for value in values):
+            function = max if name == "py_max" else min
+            return number_of(function(value.constant for value in values))
+        return reduce(lambda a, b: replace(pair, text=f"{pair.text}({a.text}, {b.text})"), values)
+
+    return word
+
+
+def _integer(arguments: tuple[Value, ...]) -> Value:
+    (value,) = arguments
+    if value.type == INT:
+        return value
+    if value.constant is not None:
+        return number_of(int(value.constant))
+    if value.type == BOOL:
+        return cast(value, INT)
+    return replace(value, type=INT, text=f"py_int({value.text})", rank=ATOM)
+
+
+def negated(arguments: tuple[Value, ...]) -> Value:
+    """Return ``not x``."""
+    value = cast(arguments[0], BOOL)
+    constant = None if value.constant is None else not value.constant
+    return replace(value, text=f"!{value.at(UNARY)}", rank=UNARY, constant=constant)
+
+
+def chosen(arguments: tuple[Value, ...]) -> Value:
+    """Return ``then if condition else otherwise``."""
+    condition, then, otherwise = arguments
+    condition = cast(condition, BOOL)
+    kind = joined(then.type, otherwise.type)
+    if not isinstance(kind, TupleOf):
+        then, otherwise = cast(then, kind), cast(otherwise, kind)
+    if condition.constant is not None:
+        return then if condition.constant else otherwise
+    if then.text == otherwise.text:
+        return then
+    calls = max(condition.calls, then.calls, otherwise.calls)
+    both = f"{then.at(TERNARY + 1)} : {otherwise.at(TERNARY + 1)}"
+    text = f"{condition.at(UNARY)} ? {both}"
+    return Value(kind, text, TERNARY, calls=calls)
+
+
+WORDS: dict[Any, Word] = {
+    abs: _absolute,
+    min: _extreme("py_min"),
+    max: _extreme("py_max"),
+    int: _integer,
+    float: lambda a: cast(a[0], FLOAT),
+    bool: lambda a: cast(a[0], BOOL),
+    math.sqrt: _exact("sqrt"),
+    np.sqrt: _exact("sqrt"),
+    np.floor: _exact("floor"),
+    np.fmod: _exact("fmod"),
+    math.copysign: _exact("copysign"),
+    np.copysign: _exact("copysign"),
+    np.sign: _exact("py_sign"),
+    np.isfinite: _exact("py_isfinite", BOOL),
+    np.isnan: _exact("py_isnan", BOOL),
+    math.isnan: _exact("py_isnan", BOOL),
+    lanes.where: chosen,
+    lanes.uniform: lambda a: a[0],
+    lanes.whole: _integer,
+    lanes.any_lane: lambda a: cast(a[0], BOOL),
+    lanes.all_lanes: lambda a: cast(a[0], BOOL),
+    lanes.negated: negated,
+}
+"""Functions that kernels may call beside one another."""

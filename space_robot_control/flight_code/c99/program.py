@@ -9,7 +9,7 @@ import ast
 import inspect
 import re
 import textwrap
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
@@ -21,7 +21,7 @@ from space_robot_msgs_py.compiled.records import Record
 
 from . import language as lang
 from .language import ArrayOf, Known, Pointer, RefusedError, Value
-from .statements import Statements, declared
+from .statements import INDENT, MARK, Statements
 
 MOST_PASSES = 5
 """Passes over a function until the types of its names have settled; two are usual."""
@@ -55,6 +55,11 @@ class Function:
     stores: frozenset[lang.FieldName]
     """Fields of records that it writes."""
 
+    @property
+    def head(self) -> list[tuple[str, bool]]:
+        """Names of its parameters, and which are written."""
+        return [(parameter.name, parameter.is_written) for parameter in self.parameters]
+
 
 @cache
 def syntax_of(body: Callable[..., Any]) -> tuple[ast.FunctionDef, str]:
@@ -72,14 +77,10 @@ def syntax_of(body: Callable[..., Any]) -> tuple[ast.FunctionDef, str]:
 def translated(
     program: Any, body: Callable[..., Any], kinds: tuple[lang.Type, ...], label: str
 ) -> Function:
-    """Translate a kernel of a program for types of arguments; ``label`` is a bundle's.
-
-    Raises:
-        NotInSubsetError: a construct has no translation.
-    """
+    """Translate a kernel of a program for types of arguments; ``label`` is a bundle's."""
     types: dict[str, lang.Type] = {}
     result: lang.Type = None
-    for _ in range(MOST_PASSES):
+    for _ in range(MOST_PASSES):  # an integer may turn out to be a float at the end of a loop
         translation = Statements(program, body, *syntax_of(body), kinds)
         translation.types |= types
         translation.result = result
@@ -91,11 +92,15 @@ def translated(
     for value in translation.names.values():
         if isinstance(value.type, ArrayOf) and len(value.type.shape) > 1:
             written |= value.roots  # C99 cannot pass variable rows as constant ones
-    lines = declared(translation.lines, _declarations(translation, written))
+    declarations = {
+        name: program.declaration(kind, name, name in written)
+        for name, kind in translation.types.items()
+        if name not in translation.own and not isinstance(kind, Known)
+    }
+    lines = declared(translation.lines, declarations)
     text = "\n".join(lines)
     is_used = {p: bool(re.search(rf"\b{p}\b", text)) for p, _ in translation.parameters}
-    own = {argument.arg for argument in translation.tree.args.args}
-    kept = [(p, kind) for p, kind in translation.parameters if is_used[p] or p in own]
+    kept = [(p, kind) for p, kind in translation.parameters if is_used[p] or p in translation.own]
     ignored = [f"    (void){p};" for p, _ in kept if not is_used[p]]
     return Function(
         body,
@@ -108,12 +113,56 @@ def translated(
     )
 
 
-def _declarations(translation: Statements, written: set[str]) -> dict[str, str]:
-    return {
-        name: translation.program.declaration(kind, name, name in written)
-        for name, kind in translation.types.items()
-        if name not in translation.own and not isinstance(kind, Known)
-    }
+def declared(lines: Sequence[str], declarations: Mapping[str, str]) -> list[str]:
+    """Return lines in which each name is declared in the innermost block that has it.
+
+    Args:
+        lines: of a function, indented, with a `MARK` around a name that gets a value.
+        declarations: of each local name.
+    """
+    done = list(lines)
+    for name, declaration in declarations.items():
+        value = f"{MARK}{name}{MARK} = "
+        mention = re.compile(rf"(?<![\w.>:]){name}\b")
+        places = [k for k, line in enumerate(done) if mention.search(line)]
+        for place in reversed(places):  # what nobody reads
+            _, is_value, source = done[place].partition(value)
+            if len(places) == 1 and is_value and "(" not in source:  # a call may write
+                del done[place]
+                places = []
+        if not places:
+            continue
+        first, level = places[0], _level(done[places[0]])
+        while not _is_in_block(done, first, level, places[-1]):
+            level -= 1
+            first = _beginning(done, first, level)
+        is_in_loop = any(_is_loop_around(done, k, first) for k in range(first))
+        if first == places[0] and done[first].strip().startswith(value):
+            done[first] = done[first].replace(value, f"{declaration} = ")
+        else:
+            # in a loop it keeps its value from one turn to the next, as in Python
+            place, level = (0, 1) if is_in_loop else (first, level)
+            done.insert(place, f"{INDENT * level}{declaration};")
+    return [line.replace(MARK, "") for line in done]
+
+
+def _level(line: str) -> int:
+    return (len(line) - len(line.lstrip())) // len(INDENT)
+
+
+def _is_in_block(lines: Sequence[str], first: int, level: int, last: int) -> bool:
+    return all(_level(line) >= level for line in lines[first : last + 1])
+
+
+def _beginning(lines: Sequence[str], place: int, level: int) -> int:
+    while _level(lines[place]) > level or lines[place].strip().startswith("}"):
+        place -= 1
+    return place
+
+
+def _is_loop_around(lines: Sequence[str], head: int, place: int) -> bool:
+    level, is_loop = _level(lines[head]), lines[head].strip().startswith(("for (", "while ("))
+    return is_loop and all(_level(line) > level for line in lines[head + 1 : place + 1])
 
 
 def passed(function: Function, arguments: tuple[Value, ...]) -> list[Value]:
@@ -127,16 +176,6 @@ def passed(function: Function, arguments: tuple[Value, ...]) -> list[Value]:
         elif names:
             values.append(argument)
     return values
-
-
-def kind_of_argument(value: Value) -> lang.Type:
-    """Return the type of a parameter for an argument; a truth value that is known is bound."""
-    is_bound = value.is_bound or (value.type == lang.BOOL and value.constant is not None)
-    return Known(value.constant) if is_bound else value.type
-
-
-def _names(function: Function) -> list[tuple[str, bool]]:
-    return [(p.name, p.is_written) for p in function.parameters]
 
 
 class Constant(NamedTuple):
@@ -156,12 +195,10 @@ class KernelProgram:
     def __init__(
         self, sizes: Mapping[str, int], joints: int, target: lang.C99 | None = None
     ) -> None:
-        """Begin.
+        """Begin, for n joints, of which the shapes of records are functions.
 
-        Args:
-            sizes: numbers that stand for constants of modules, by name, as capacities of arrays.
-            joints: n, of which the shapes of records are functions.
-            target: the language that is written; None: C99.
+        ``sizes`` stand for constants of modules by name, as capacities of arrays; ``target`` is the
+        language that is written, C99 if none is given.
         """
         self.sizes, self.joints, self.target = dict(sizes), joints, target or lang.C99()
         self.constants: dict[lang.FieldName, float] = {}
@@ -182,6 +219,7 @@ class KernelProgram:
         self.records[id(record)] = record
         declared = record.fields()[name]
         assert isinstance(declared, RecordField)
+        # a shape is a lambda that reads capacities of its module: here it reads the export's
         shape: Any = declared.shape
         resized = FunctionType(
             shape.__code__, {**shape.__globals__, **self.sizes}, None, None, shape.__closure__
@@ -262,10 +300,16 @@ class KernelProgram:
         tree, file = syntax_of(body)
         if len(tree.args.args) != len(arguments):
             raise RefusedError(f"a call of {tree.name}() without all arguments", "give them all")
-        kinds = tuple(map(kind_of_argument, arguments))
+        # a truth value that is known is bound
+        kinds = tuple(
+            Known(a.constant)
+            if a.is_bound or (a.type == lang.BOOL and a.constant is not None)
+            else a.type
+            for a in arguments
+        )
         if (body, kinds) in self._known:
             return self._known[body, kinds]
-        if body in self._active:
+        if body in self._active:  # a flight computer's stack is bounded
             line = body.__code__.co_firstlineno
             raise lang.NotInSubsetError(file, line, "recursion", "write a loop")
         labels = [kind.label for kind in kinds if isinstance(kind, lang.Bundle)]
@@ -274,7 +318,8 @@ class KernelProgram:
         self._active.pop()
         number = len(self.functions)
         for k, old in enumerate(self.functions):
-            if old.body is body and old.lines == new.lines and _names(old) == _names(new):
+            # lengths that are not read make no other function
+            if old.body is body and old.lines == new.lines and old.head == new.head:
                 pairs = zip(old.parameters, new.parameters, strict=True)
                 merged = tuple(replace(p, type=lang.joined(p.type, q.type)) for p, q in pairs)
                 self.functions[k] = replace(old, parameters=merged)

@@ -1,13 +1,13 @@
-"""Statements of kernels as statements of C, and where C declares the local names."""
+"""Statements of kernels as statements of C; local names are declared later, by `.program`."""
 
 from __future__ import annotations
 
 import ast
 import re
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
-from functools import cache
+from functools import cache, reduce
 from typing import Any
 
 from . import language as lang
@@ -36,10 +36,7 @@ class Statements(Expressions):
         file: str,
         kinds: Sequence[lang.Type],
     ) -> None:
-        """Translate the body of ``tree``, the syntax of ``function``, which stands in ``file``.
-
-        ``kinds`` are the types of the arguments.
-        """
+        """Translate the body of ``tree``, the syntax of ``function``, for types of arguments."""
         super().__init__(program, function)
         self.tree, self.file = tree, file
         self.first_line = function.__code__.co_firstlineno
@@ -86,11 +83,7 @@ class Statements(Expressions):
         return Value(kind, name, roots=frozenset({name}))
 
     def body(self) -> None:
-        """Translate all statements.
-
-        Raises:
-            NotInSubsetError: one has no translation.
-        """
+        """Translate all statements."""
         try:
             self.assigned = assigned_in(self.tree)
         except RefusedError as refusal:
@@ -100,7 +93,7 @@ class Statements(Expressions):
     def refused(self, node: ast.AST, refusal: RefusedError) -> lang.NotInSubsetError:
         """Return the error for a refused construct."""
         line = self.first_line + getattr(node, "lineno", 1) - 1
-        return lang.NotInSubsetError(self.file, line, refusal.what, refusal.instead)
+        return lang.NotInSubsetError(self.file, line, refusal.construct, refusal.instead)
 
     def emit(self, line: str) -> None:
         """Add a line."""
@@ -130,6 +123,7 @@ class Statements(Expressions):
                 test = test.args[0]
             else:
                 break
+        # what a call returns or an attribute holds may be another value the next time
         is_plain = not any(isinstance(n, (ast.Call, ast.Attribute)) for n in ast.walk(test))
         names = names_in([test])
         if is_plain and names.keys() <= self.names.keys() and all(map(self._is_steady_name, names)):
@@ -146,6 +140,7 @@ class Statements(Expressions):
             self._assign_together(node.targets[0], node.value)
             return
         value = self.translate(node.value)
+        # a = b = f() calls once
         if len(node.targets) > 1 and (value.calls or isinstance(value.type, lang.TupleOf)):
             value = self._named("value", value)
         for target in node.targets:
@@ -168,6 +163,8 @@ class Statements(Expressions):
                 self._assign(part, Value(kind, item, lang.POSTFIX))
             return
         values = [self.translate(part) for part in source.elts]
+        # Python evaluates all values before it stores the first: C needs names for those that
+        # earlier targets change
         for k in range(1, len(values)):
             written = [ast.unparse(earlier) for earlier in target.elts[:k]]
             mentioned = {ast.unparse(n) for n in ast.walk(source.elts[k])}
@@ -200,6 +197,7 @@ class Statements(Expressions):
         roots = frozenset({name}) | value.roots | self._roots.get(name, frozenset())
         self._roots[name] = roots
         local = Value(kind, name, constant=known, roots=roots, fields=value.fields)
+        # an integer or truth value that is known is written as a number, and decides branches
         if known is not None and kind == lang.INT:
             local = replace(number_of(known), roots=frozenset())
         elif known is not None and kind == lang.BOOL:
@@ -265,6 +263,7 @@ class Statements(Expressions):
         first, lines = len(self.lines), self.lines
         is_left = self._inside(node.orelse) and is_left
         self.facts = known
+        # an else with nothing but one chain of ifs becomes "else if"
         level = INDENT * (self._depth + 1)
         heads = [line[len(level) :] for line in lines[first:] if line[len(level) :][:1] != " "]
         if heads and heads[0][:4] == "if (" and all(head[:1] == "}" for head in heads[1:]):
@@ -309,12 +308,15 @@ class Statements(Expressions):
         if by not in (1, -1):
             raise RefusedError("a loop with another step than 1 or -1", "compute the index")
         is_known = start.constant is not None and stop.constant is not None
+        # a loop without turns: a base may have no wheels, and C has no arrays of length 0
         if is_known and (stop.constant - start.constant) * by <= 0:
             return
+        # Python evaluates a range's end once, C before every turn of its loop
         stop_text = stop.at(lang.SUM)
         if stop.constant is None and not self._is_steady(ends[1], node):
             stop_text = self._fresh("end")
             self.emit(f"const int64_t {stop_text} = {stop.text};")
+        # loops that count by _ may be nested
         shown = self._fresh("round") if name == "_" else name
         self.names[name] = Value(lang.INT, shown)
         sign, change = ("<", "++") if by == 1 else (">", "--")
@@ -338,9 +340,7 @@ class Statements(Expressions):
         lists: list[tuple[str, lang.Type, str]] = []
         for k, target in enumerate(targets):
             values = [self.translate(row[k]) for row in rows]
-            kind: lang.Type = None
-            for value in values:
-                kind = lang.joined(kind, value.type)
+            kind = reduce(lang.joined, (value.type for value in values))
             table = self._fresh(f"{ast.unparse(target)}s")
             texts = ", ".join(cast(value, kind).text for value in values)
             self.emit(f"const {kind.name} {table}[{len(rows)}] = {{{texts}}};")
@@ -376,7 +376,7 @@ class Statements(Expressions):
             self.emit(f"{'' if value.type == lang.VOID else '(void)'}{value.text};")
 
     def _pass_statement(self, node: ast.Pass) -> None:
-        """Do nothing."""
+        pass
 
     def _leave_statement(self, node: ast.stmt) -> bool:
         self.emit(f"{type(node).__name__.lower()};")
@@ -399,10 +399,7 @@ class Statements(Expressions):
 
 def names_in(nodes: Iterable[ast.AST], stored: bool = False) -> Counter[str]:
     """Return how often names are mentioned; ``stored``: how often they get a value."""
-    counted: Counter[str] = Counter()
-    for node in nodes:
-        counted.update(_names_in(node, stored))
-    return counted
+    return sum((_names_in(node, stored) for node in nodes), Counter[str]())
 
 
 @cache
@@ -413,11 +410,7 @@ def _names_in(node: ast.AST, stored: bool) -> Counter[str]:
 
 @cache
 def assigned_in(tree: ast.FunctionDef) -> Counter[str]:
-    """Return how often names get a value in a function.
-
-    Raises:
-        RefusedError: what a loop counts is mentioned outside of it, where it differs in C.
-    """
+    """Return how often names get a value in a function; refuse names that C cannot have so."""
     inside: Counter[str] = Counter()
     for loop in (n for n in ast.walk(tree) if isinstance(n, ast.For)):
         for name in names_in([loop.target]):
@@ -431,54 +424,3 @@ def assigned_in(tree: ast.FunctionDef) -> Counter[str]:
         if mentioned[name] != count and name != "_":
             raise RefusedError(f"{name!r} outside of its loop", "use another name")
     return names_in([tree], stored=True)
-
-
-def declared(lines: Sequence[str], declarations: Mapping[str, str]) -> list[str]:
-    """Return lines in which each name is declared in the innermost block that has it.
-
-    Args:
-        lines: of a function, indented, with a `MARK` around a name that gets a value.
-        declarations: of each local name.
-    """
-    done = list(lines)
-    for name, declaration in declarations.items():
-        value = f"{MARK}{name}{MARK} = "
-        mention = re.compile(rf"(?<![\w.>:]){name}\b")
-        places = [k for k, line in enumerate(done) if mention.search(line)]
-        for place in reversed(places):  # what nobody reads
-            _, is_value, source = done[place].partition(value)
-            if len(places) == 1 and is_value and "(" not in source:
-                del done[place]
-                places = []
-        if not places:
-            continue
-        first, level = places[0], _level(done[places[0]])
-        while not _is_in_block(done, first, level, places[-1]):
-            level -= 1
-            first = _beginning(done, first, level)
-        is_in_loop = any(_is_loop_around(done, k, first) for k in range(first))
-        if first == places[0] and done[first].strip().startswith(value):
-            done[first] = done[first].replace(value, f"{declaration} = ")
-        else:
-            place, level = (0, 1) if is_in_loop else (first, level)
-            done.insert(place, f"{INDENT * level}{declaration};")
-    return [line.replace(MARK, "") for line in done]
-
-
-def _level(line: str) -> int:
-    return (len(line) - len(line.lstrip())) // len(INDENT)
-
-
-def _is_in_block(lines: Sequence[str], first: int, level: int, last: int) -> bool:
-    return all(_level(line) >= level for line in lines[first : last + 1])
-
-
-def _beginning(lines: Sequence[str], place: int, level: int) -> int:
-    while _level(lines[place]) > level or lines[place].strip().startswith("}"):
-        place -= 1
-    return place
-
-
-def _is_loop_around(lines: Sequence[str], head: int, place: int) -> bool:
-    level, is_loop = _level(lines[head]), lines[head].strip().startswith(("for (", "while ("))
-    return is_loop and all(_level(line) > level for line in lines[head + 1 : place + 1])

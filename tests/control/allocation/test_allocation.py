@@ -120,7 +120,7 @@ def test_unloading_lasts_from_one_threshold_to_the_other(k: int, side: float) ->
         bench.momenta[k] = side * share * limits[k]
         bench.step(np.zeros(3))
         assert bench.allocation.unloading.is_active == is_active
-        assert np.any(bench.allocation.of_thrusters) == bool(is_active)
+        assert np.any(bench.allocation.thruster_demand) == bool(is_active)
 
 
 @pytest.mark.parametrize("count", [3, 4, 6])
@@ -143,7 +143,7 @@ def test_unloading_asks_what_half_of_the_wheels_torque_can_hold(count: int) -> N
         shares = most[:, None] * np.linalg.pinv(bench.axes.T * most)
         excess = max(1.0, np.max(np.abs(shares @ wanted) / (0.5 * most)))
         bench.step(np.zeros(3))
-        np.testing.assert_allclose(bench.allocation.of_thrusters, wanted / excess, atol=1e-9)
+        np.testing.assert_allclose(bench.allocation.thruster_demand, wanted / excess, atol=1e-9)
         cut += excess > 1.0
     assert 0 < cut < 20
 

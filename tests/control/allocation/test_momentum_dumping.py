@@ -171,7 +171,7 @@ def test_who_unloads_is_chosen(dump: str | None, magnetic: bool, by_thrusters: b
     bench.step(np.zeros(3), [1e-5, 2e-5, 2e-5])
     assert bool(bench.dipoles.any()) is bool(bench.of_torquers.any()) is magnetic
     assert bool(bench.allocation.unloading.is_active) is by_thrusters
-    assert bool(np.any(bench.allocation.of_thrusters)) is by_thrusters
+    assert bool(np.any(bench.allocation.thruster_demand)) is by_thrusters
 
 
 def test_the_wheels_are_asked_for_no_more_than_they_have() -> None:

@@ -19,7 +19,7 @@ from space_robot_control.allocation.thrusters import (
     modulate,
     within_reach,
 )
-from space_robot_model.hardware.thrusters import ThrusterSettings
+from space_robot_model.hardware.base_actuators import ThrusterSettings
 from space_robot_msgs_py.samples import MOST_THRUSTERS
 
 Array = NDArray[np.float64]

@@ -15,7 +15,8 @@ from strategies import Case, cases, random_quaternion
 
 from space_robot_control.allocation.settings import AllocationSettings
 from space_robot_control.controller.controller import Controller
-from space_robot_control.controller.supervisor import Mode, Supervisor
+from space_robot_control.controller.supervisor import Supervisor
+from space_robot_control.controller.tick import HOLDING, SAFE
 from space_robot_control.laws import find_law
 from space_robot_model.hardware.base_actuators import BaseActuatorSettings
 from space_robot_model.robot import Robot
@@ -227,7 +228,7 @@ def test_while_it_holds_its_torque_valves_are_closed_and_dipoles_off(
         held = supervisor.answer(bad, REST)
         assert held.torque[13:].size == 12 + 3
         assert not held.torque[13:].any()
-        assert supervisor.mode is (Mode.HOLDING if tick < 6 else Mode.SAFE)
+        assert supervisor.mode == (HOLDING if tick < 6 else SAFE)
         np.testing.assert_array_equal(held.torque[9:13], wheels if tick < 6 else np.zeros(4))
     assert supervisor.answer(state_at(8), REST).torque[25:].all()
 

@@ -22,7 +22,7 @@ from oracles import (
 from strategies import Case, cases
 
 from space_robot_control.controller.controller import Controller
-from space_robot_control.controller.gains import NOMINAL, check_gains, read_gains
+from space_robot_control.controller.gains import NOMINAL_H_BAR, check_gains, read_gains
 from space_robot_control.controller.loop import LawSet
 from space_robot_control.controller.settings import ControllerNodeSettings
 from space_robot_control.laws import ControlLaw, find_law, laws
@@ -138,7 +138,7 @@ def test_the_controller_adds_the_inertia_times_u(name: str, case: Case) -> None:
 
 def test_a_gains_file_says_nominal(tmp_path: Path) -> None:
     """As a word, or in a list; recorded and told as zeros, which are the same."""
-    for h_bar in (NOMINAL, [NOMINAL], [0.0], [0.0] * 9):
+    for h_bar in (NOMINAL_H_BAR, [NOMINAL_H_BAR], [0.0], [0.0] * 9):
         path = tmp_path / "tde_smc.yaml"
         content = {"h_bar": h_bar, "lambda": [1.0], "g": [0.1]}
         path.write_text(
@@ -167,11 +167,11 @@ POSITIVE = "finite values above 0 (or nominal: as numbers all 0) were expected"
             "9 values (base x, y, z and the joints) or 1 were expected",
         ),
         ("tde_smc", "h_bar", [0.0] * 8 + [float("nan")], "finite values above 0 (or nominal"),
-        ("tde_smc", "h_bar", [NOMINAL] * 9, "numbers were expected, got"),
-        ("tde_smc", "h_bar", [NOMINAL, 1.0], "numbers were expected, got"),
+        ("tde_smc", "h_bar", [NOMINAL_H_BAR] * 9, "numbers were expected, got"),
+        ("tde_smc", "h_bar", [NOMINAL_H_BAR, 1.0], "numbers were expected, got"),
         ("tde_smc", "h_bar", "Nominal", "numbers were expected, got 'Nominal'"),
         ("tde_smc", "h_bar", 0.0, "numbers were expected, got 0.0"),
-        ("tde_smc", "lambda", NOMINAL, "numbers were expected, got 'nominal'"),
+        ("tde_smc", "lambda", NOMINAL_H_BAR, "numbers were expected, got 'nominal'"),
         ("dob", "inertia", [0.0], "finite values above 0 were expected"),
         ("adrc", "inertia", [0.0], "finite values above 0 were expected"),
         ("slotine_li", "spread", [1.0], "finite values 0 or more and below 1"),

@@ -28,7 +28,7 @@ pytest.importorskip("rclpy")
 
 
 from space_robot_control.controller import inputs
-from space_robot_control.controller.inputs import WAIT_TOLD_S, ReferenceInput, StateInput
+from space_robot_control.controller.inputs import OVERDUE_S, ReferenceInput, StateInput
 
 TIMEBASE = Timebase(500_000)
 ROBOT = Robot.from_yaml(CONFIG / "robots" / "paper.yaml")
@@ -180,16 +180,16 @@ def test_a_mission_that_does_not_come_is_awaited_and_told_after_a_while(
     bench = References(monkeypatch)
     assert bench.joint(0) is None
     assert bench.input.is_awaited
-    assert not bench.input.is_waited_for
-    bench.now += 0.9 * WAIT_TOLD_S
+    assert not bench.input.is_overdue
+    bench.now += 0.9 * OVERDUE_S
     assert bench.joint(0) is None
-    assert not bench.input.is_waited_for
-    bench.now += 0.2 * WAIT_TOLD_S  # since the first look, not since the last
+    assert not bench.input.is_overdue
+    bench.now += 0.2 * OVERDUE_S  # since the first look, not since the last
     assert bench.joint(0) is None
-    assert bench.input.is_waited_for
+    assert bench.input.is_overdue
     bench.send(0, 5)
     assert bench.joint(0) == 0.0
-    assert not bench.input.is_waited_for
+    assert not bench.input.is_overdue
     assert not bench.input.is_awaited
 
 

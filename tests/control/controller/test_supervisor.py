@@ -15,8 +15,14 @@ from numpy.typing import NDArray
 from space_robot_control.controller.controller import Controller
 from space_robot_control.controller.reference_buffer import ReferenceBuffer
 from space_robot_control.controller.signals import LARGEST
-from space_robot_control.controller.supervisor import Mode, Supervisor
-from space_robot_control.controller.tick import NOMINAL_FROM_ETA, SAFE_BELOW_ETA
+from space_robot_control.controller.supervisor import Supervisor
+from space_robot_control.controller.tick import (
+    HOLDING,
+    NOMINAL,
+    NOMINAL_FROM_ETA,
+    SAFE,
+    SAFE_BELOW_ETA,
+)
 from space_robot_control.controller.time_delay_estimation import LONGEST_GAP
 from space_robot_control.laws import ControlLaw, LawGains, Signals
 from space_robot_model.hardware.base_actuators import BaseActuatorSettings
@@ -89,7 +95,7 @@ def test_a_bad_reference_is_held_as_a_buffer_holds_it(paper_robot: Robot, name: 
         np.testing.assert_array_equal(supervisor.answer(state_at(tick), reference).torque, answer)
         for mine, expected in zip(supervisor.telemetry(), other.telemetry(), strict=True):
             np.testing.assert_array_equal(mine, expected)
-        assert supervisor.mode is Mode.NOMINAL
+        assert supervisor.mode == NOMINAL
         assert supervisor.reason == ("reference held" if tick in bad else "")
     assert supervisor.rejected == {"reference held": 5}
 
@@ -101,10 +107,10 @@ def test_before_the_first_reference_no_law_answers(paper_robot: Robot, law: Cont
     nothing.view(np.float64)[3] = np.nan
     for tick in range(HOLD + 2):
         assert not supervisor.answer(state_at(tick), nothing).torque.any()
-        assert supervisor.mode is (Mode.HOLDING if tick < HOLD else Mode.SAFE)
+        assert supervisor.mode == (HOLDING if tick < HOLD else SAFE)
         assert supervisor.reason == "no reference"
     supervisor.answer(state_at(HOLD + 2), moving(0))  # it takes over from no torque
-    assert supervisor.mode is Mode.NOMINAL
+    assert supervisor.mode == NOMINAL
     assert supervisor.answer(state_at(HOLD + 3), nothing).torque.any()
     assert supervisor.rejected == {"no reference": HOLD + 2, "reference held": 1}
 
@@ -127,10 +133,10 @@ def assert_safe(supervisor: Supervisor, state: RobotState) -> None:
     command = supervisor.answer(state, REST)
     assert np.isfinite(command.torque).all()
     assert command.tick == state.tick
-    nominal = supervisor.mode is Mode.NOMINAL
+    nominal = supervisor.mode == NOMINAL
     assert nominal == (supervisor.reason == "")
     assert supervisor.rejected.total() - before == (not nominal)
-    if supervisor.mode is Mode.SAFE:
+    if supervisor.mode == SAFE:
         assert not command.torque.any()
 
 
@@ -154,7 +160,7 @@ def test_whatever_is_measured_commands_are_finite_and_it_comes_back(
         assert_safe(supervisor, state)
     for k in range(1, 4):
         assert_safe(supervisor, state_at(tick + k))
-        assert supervisor.mode is Mode.NOMINAL
+        assert supervisor.mode == NOMINAL
 
 
 @given(st.lists(st.booleans(), min_size=1, max_size=60), st.integers(0, HOLD))
@@ -168,10 +174,10 @@ def test_a_bad_state_is_answered_with_the_last_torque_for_a_while(
         command = supervisor.answer(state if is_good else with_nan(state), REST)
         bad = 0 if is_good else bad + 1
         if is_good:
-            assert supervisor.mode is Mode.NOMINAL
+            assert supervisor.mode == NOMINAL
             last = command.torque.copy()
         else:
-            assert supervisor.mode is (Mode.HOLDING if bad <= hold_ticks else Mode.SAFE)
+            assert supervisor.mode == (HOLDING if bad <= hold_ticks else SAFE)
             np.testing.assert_array_equal(command.torque, last if bad <= hold_ticks else 0.0 * last)
     assert supervisor.rejected.total() == good.count(False)
 
@@ -214,7 +220,7 @@ def test_a_bad_state_is_counted_held_over_and_leaves_no_trace(
     held = shown.supervisor.answer(state, reference).torque
     np.testing.assert_array_equal(held, before)
     assert shown.supervisor.rejected == {kind: 1}
-    assert shown.supervisor.mode is Mode.HOLDING
+    assert shown.supervisor.mode == HOLDING
     with pytest.raises(UnusableStateError, match="at tick 20 the") as caught:
         shown.controller.update(state, reference)
     assert (caught.value.tick, caught.value.kind) == (20, kind)
@@ -233,7 +239,7 @@ def test_near_half_a_turn_it_is_safe_until_well_away(paper_robot: Robot) -> None
     for tick, eta in enumerate(etas):
         assert_safe(supervisor, state_at(tick, eta))
         modes.append(supervisor.mode)
-    assert modes == [Mode.NOMINAL] * 2 + [Mode.SAFE] * 2 + [Mode.NOMINAL] * 2
+    assert modes == [NOMINAL] * 2 + [SAFE] * 2 + [NOMINAL] * 2
     assert supervisor.rejected == {"attitude error near 180 degrees": 2}
 
 
@@ -245,16 +251,16 @@ def test_half_a_turn_is_that_of_the_error(paper_robot: Robot) -> None:
     other_sign["quaternion"] *= -1.0
     for tick, (eta, reference, mode) in enumerate(
         [
-            (0.0, turned, Mode.NOMINAL),
-            (SAFE_BELOW_ETA / 2, turned, Mode.NOMINAL),
-            (1.0, turned, Mode.SAFE),
-            (1.0, REST, Mode.NOMINAL),
-            (0.0, REST, Mode.SAFE),
-            (0.0, other_sign, Mode.NOMINAL),
+            (0.0, turned, NOMINAL),
+            (SAFE_BELOW_ETA / 2, turned, NOMINAL),
+            (1.0, turned, SAFE),
+            (1.0, REST, NOMINAL),
+            (0.0, REST, SAFE),
+            (0.0, other_sign, NOMINAL),
         ]
     ):
         command = supervisor.answer(state_at(tick, eta), reference)
-        assert supervisor.mode is mode, tick
+        assert supervisor.mode == mode, tick
         assert np.isfinite(command.torque).all()
     assert supervisor.rejected == {"attitude error near 180 degrees": 2}
 
@@ -270,7 +276,7 @@ def test_a_free_base_has_no_singular_attitude_and_gets_no_torque(
         torque = supervisor.answer(state_at(tick, eta), REST).torque
         np.testing.assert_array_equal(torque[:3], 0.0)
         assert torque[3:].all()
-        assert supervisor.mode is Mode.NOMINAL
+        assert supervisor.mode == NOMINAL
     assert not supervisor.rejected
 
 
@@ -295,7 +301,7 @@ def test_time_that_goes_back_while_holding_does_not_make_it_hold_for_longer(
     supervisor.answer(state_at(1000), REST)
     for tick in (1001, 3):
         supervisor.answer(with_nan(state_at(tick)), REST)
-    assert supervisor.mode is Mode.SAFE
+    assert supervisor.mode == SAFE
 
 
 def test_standing_down_commands_nothing_and_forgets(paper_robot: Robot) -> None:
@@ -334,7 +340,7 @@ def test_a_blind_flight_finds_back_without_a_jolt(
     assert not torques[100:].any()
     applied = loop.plant.state.applied_torque.copy()
     errors, torques = loop.fly(4000)
-    assert loop.supervisor.mode is Mode.NOMINAL
+    assert loop.supervisor.mode == NOMINAL
     if blind_ticks > LONGEST_GAP:  # it takes over from what is applied
         np.testing.assert_allclose(torques[0], applied, atol=1e-9)
     else:  # the law goes on, its estimate a few ticks old

@@ -23,13 +23,13 @@ from space_robot_control.controller.tick import (
     STATUSES,
 )
 from space_robot_control.flight_code.acceptance import (
+    corrupt_state,
+    corrupted_reference,
+    disturb_state,
     hostile_ticks,
-    shake,
-    spoil,
-    spoiled_reference,
 )
 from space_robot_control.flight_code.folder import Exported
-from space_robot_control.flight_code.library import CONDITION, FlightLibrary
+from space_robot_control.flight_code.instances import CONDITION, FlightLibrary
 from space_robot_control.flight_code.supervisors import bits
 from space_robot_msgs_py.samples import Reference, RobotState
 
@@ -64,11 +64,11 @@ def test_c_answers_like_python(seed: int, law: str, share: float) -> None:
         if standing == NEW:
             state, reference = flight.plant.state.copy(), references[k : k + 1]
             state.tick = tick
-            shake(state, 10.0 ** random.uniform(-8, 0), random)
+            disturb_state(state, 10.0 ** random.uniform(-8, 0), random)
             desired = reference["quaternion"][0]
-            spoil(state, wheels, random, desired, is_hostile=random.random() < share)
+            corrupt_state(state, wheels, random, desired, is_hostile=random.random() < share)
             if random.random() < share:
-                reference = spoiled_reference(reference, random)
+                reference = corrupted_reference(reference, random)
             command, status = supervisor.answer(state, reference), code.answer(state, reference)
             np.testing.assert_array_equal(bits(code.command), bits(command.torque))
             assert bool(status) == bool(supervisor.reason)
@@ -80,7 +80,7 @@ def test_c_answers_like_python(seed: int, law: str, share: float) -> None:
 
 
 @pytest.mark.parametrize("desired", [[1.0, 0.0, 0.0, 0.0], [0.1, 0.7, -0.5, 0.5]])
-def test_spoiled_states_meet_half_a_turn_from_wherever_the_base_should_be(
+def test_corrupted_states_meet_half_a_turn_from_wherever_the_base_should_be(
     desired: list[float],
 ) -> None:
     """Both sides of the limits of `supervision`, which look at the error."""
@@ -89,7 +89,7 @@ def test_spoiled_states_meet_half_a_turn_from_wherever_the_base_should_be(
         state = RobotState.allocate(6)
         state.quaternion[:] = q_d
         with np.errstate(all="ignore"):
-            spoil(state, 0, random, q_d)
+            corrupt_state(state, 0, random, q_d)
         if not (np.abs(state.quaternion) < 2.0).all():
             continue
         if abs(np.linalg.norm(state.quaternion) - 1.0) < 1e-12:

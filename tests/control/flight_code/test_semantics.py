@@ -32,7 +32,7 @@ from space_robot_control.flight_code.c99.language import (
 from space_robot_control.flight_code.c99.program import KernelProgram
 from space_robot_control.flight_code.files import Files
 from space_robot_control.flight_code.folder import FLAGS, WARNINGS
-from space_robot_control.flight_code.library import build_library
+from space_robot_control.flight_code.instances import build_library
 from space_robot_model.elementary.functions import sin_cos
 from space_robot_msgs_py.compiled.kernels import kernel
 from space_robot_msgs_py.compiled.lanes import uniform, where, whole

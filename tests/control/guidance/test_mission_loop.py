@@ -19,9 +19,9 @@ from space_robot_msgs_py.wire.telemetry import ClockCodec, ReferenceCodec
 pytest.importorskip("rclpy")
 
 from space_robot_control.guidance import loop, mission_changes
-from space_robot_control.guidance.loop import CLOCK_WAIT_S, GREET_S, MOST_AT_ONCE, MissionLoop
+from space_robot_control.guidance.loop import CLOCK_WAIT_S, MOST_AT_ONCE, RESEND_S, MissionLoop
 from space_robot_control.guidance.mission import Mission
-from space_robot_control.guidance.mission_changes import TOLD_S
+from space_robot_control.guidance.mission_changes import WARNING_S
 from space_robot_msgs_py.ros.loop import Level
 
 CHUNK, LEAD = 10, 35
@@ -124,14 +124,14 @@ def test_who_joins_is_told_again_what_is_still_needed(bench: Bench) -> None:
     assert bench.run() == [0, 10, 20, 30, 40, 50, 60]
     bench.joints.listener_count = bench.base.listener_count = 1
     assert bench.run() == [], "nobody looks so soon"
-    bench.now += GREET_S
+    bench.now += RESEND_S
     assert bench.run() == [30, 40, 50, 60]
     for count in (1, 0):
         bench.base.listener_count = count
-        bench.now += GREET_S
+        bench.now += RESEND_S
         assert bench.run() == []
     bench.base.listener_count = 1
-    bench.now += GREET_S
+    bench.now += RESEND_S
     assert bench.run() == [30, 40, 50, 60]
 
 
@@ -229,5 +229,5 @@ def test_junk_on_the_topic_of_trajectories_is_refused_in_one_line(bench: Bench) 
     assert told[0].values["trajectories refused"] == 3
     assert [health.mode for health in told] == [*refused, refused[-1]]
     assert {health.level for health in told} == {Level.WARN}
-    bench.now += TOLD_S
+    bench.now += WARNING_S
     assert (bench.loop.health().mode, bench.loop.health().level) == ("nominal", Level.OK)

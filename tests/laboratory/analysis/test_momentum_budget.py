@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 import pytest
+from bags import messages_in
 from benches import WHEEL_AXES as PYRAMID
 from benches import flat, hardware, still_log
 from numpy.typing import NDArray
@@ -228,10 +229,9 @@ def test_ticks_whose_torques_are_lost_are_left_out(
 ) -> None:
     """As of a plant that was killed: its last ticks were not told yet."""
     flight = TORQUED.replace(orbit="iss", duration=0.1).fly(tmp_path / "whole")
-    whole = open_bag(tmp_path / "whole")
-    described = json.loads(whole.custom_data()["space_robot.flight"])
+    described = json.loads(open_bag(tmp_path / "whole").custom_data()["space_robot.flight"])
     recorder, chunk = BagRecorder(tmp_path / "bag", described, flight.flight.timebase), -1
-    for name, data in whole.messages(*topics.ALL):
+    for name, data in messages_in(tmp_path / "whole"):
         chunk += name == topics.TRUTH_ORBIT.full_name
         if name != topics.TRUTH_ORBIT.full_name or chunk != lost:
             recorder.record(topics.BY_NAME[name], data)

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from bags import messages_in
 from flights import planned
 from numpy.typing import NDArray
 
@@ -15,7 +16,6 @@ from space_robot.flight.plan import Flight
 from space_robot.flight.simulate import simulate
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.bag.flight_log import FlightLog
-from space_robot_msgs_py.bag.folder import open_bag
 from space_robot_msgs_py.bag.reader import read_flight
 from space_robot_msgs_py.errors import SingularAttitudeError
 
@@ -95,7 +95,7 @@ def test_faults_of_messages_strike_all_parts_of_a_state_alike(
     assert log.filled > 0
     assert set(log.lost.values()) == {0}
     assert np.isfinite(log.wheel_velocities).all()
-    sent = {t: [*open_bag(tmp_path / "bag").messages(t)] for t in topics.STATES}
+    sent = {t: [*messages_in(tmp_path / "bag", t)] for t in topics.STATES}
     stamps = {topic: [data[4:12] for _, data in found] for topic, found in sent.items() if found}
     assert 0 < len(stamps[topics.BASE_STATE]) < 200
     assert all(found == stamps[topics.BASE_STATE] for found in stamps.values())

@@ -14,6 +14,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from bags import messages_in
 from flights import forked_space_robot, planned
 from matrix.scenarios import difference
 
@@ -26,7 +27,6 @@ from space_robot.flight.simulate import simulate
 from space_robot_control.laws import Signals
 from space_robot_control.laws.base import LawError
 from space_robot_msgs_py import topics
-from space_robot_msgs_py.bag.folder import open_bag
 from space_robot_msgs_py.bag.reader import read_flight
 from space_robot_msgs_py.errors import (
     DivergedError,
@@ -89,7 +89,7 @@ def test_every_tick_is_in_log_and_bag(
     assert difference(read, log, {"telemetry"}) == ""
     assert read.laws == log.laws
     assert (read.unfinished, read.damage, read.unanswered) == ("", (), log.unanswered)
-    messages = Counter(topic for topic, _ in open_bag(tmp_path / "bag").messages(*topics.ALL))
+    messages = Counter(topic for topic, _ in messages_in(tmp_path / "bag"))
     counts = {
         topics.JOINT_STATES: sent,
         topics.BASE_STATE: sent,

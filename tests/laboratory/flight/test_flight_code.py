@@ -19,8 +19,12 @@ from matrix.scenarios import difference
 from paths import ROOT
 
 from space_robot.export.software import export
-from space_robot_control.flight_code.library import FlightLibrary, write_sources
-from space_robot_control.flight_code.remote import BEGIN, FlightComputer
+from space_robot_control.flight_code.instances import (
+    BEGIN,
+    FlightComputer,
+    FlightLibrary,
+    write_sources,
+)
 from space_robot_control.flight_code.supervisors import ShadowError, bits
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.bag.reader import read_flight
@@ -153,7 +157,7 @@ def test_without_a_flight_computer_nothing_flies(command: str, tmp_path: Path) -
 
 
 def test_one_that_falls_silent_ends_the_flight(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("space_robot_control.flight_code.remote.TIMEOUT_S", 0.2)
+    monkeypatch.setattr("space_robot_control.flight_code.instances.TIMEOUT_S", 0.2)
     exported = export(planned())
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as server:
         server.bind(("127.0.0.1", 0))

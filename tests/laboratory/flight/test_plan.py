@@ -102,15 +102,8 @@ def test_all_that_is_made_of_a_plan_agrees(plan: Planned) -> None:
     assert theirs.block.tobytes() == flight.plant.block.tobytes()
     assert theirs.command_delay_buffer.shape == flight.plant.command_delay_buffer.shape
     assert assumed_actuators(controller.actuators, robot) == flight.scenario.assumed_actuators
-    loop = Controller(
-        robot,
-        law,
-        controller.period,
-        controller.acceleration_filter_hz,
-        controller.filter_settings,
-        assumed_actuators(controller.actuators, robot),
-        controller.allocation,
-    )
+    actuators = assumed_actuators(controller.actuators, robot)
+    loop = Controller.from_settings(robot, law, controller, actuators)
     assert loop.block.tobytes() == flight.controller.block.tobytes()
     assert law.gains_block.tobytes() == flight.controller.law.gains_block.tobytes()
     reference = Mission(robot, mission, mission.period).chunk(0, 100)

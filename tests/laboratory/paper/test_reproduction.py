@@ -179,5 +179,5 @@ def test_a_folder_of_something_else_is_left_alone(tmp_path: Path) -> None:
 
 def test_a_base_that_nothing_turns_is_not_table_vs(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="actuators none: Table V has attitude errors"):
-        reproduce(ROWS[:1], tmp_path / "out", equipment=Equipment(actuators="none"))
+        reproduce(ROWS[:1], tmp_path / "out", jobs=1, equipment=Equipment(actuators="none"))
     assert not list(tmp_path.iterdir())

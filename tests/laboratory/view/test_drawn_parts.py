@@ -35,7 +35,7 @@ from space_robot.view.wheels import (
     wheel_places,
 )
 from space_robot_control.allocation.settings import assumed_actuators
-from space_robot_model.hardware.wheels import WheelSettings
+from space_robot_model.hardware.base_actuators import WheelSettings
 from space_robot_model.robot import Robot
 from space_robot_model.robot.parts import Plate, Visual
 from space_robot_model.robot.shapes import BASE_COLOUR, PANEL_COLOUR

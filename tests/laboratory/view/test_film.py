@@ -104,7 +104,7 @@ def test_the_poses_on_the_page_are_the_bags(flown: Flown) -> None:
 def test_the_poses_of_a_tree_with_all_kinds_of_joints() -> None:
     rng = np.random.default_rng(5)
     kinds = ["revolute", "prismatic", "passive revolute", "fixed", "passive prismatic", "revolute"]
-    robot = Robot.of_tree(random_tree(rng, kinds))
+    robot = Robot.from_tree(random_tree(rng, kinds))
     log = moving_log(robot, 40, period_ns=10_000_000)
     log.base_position[:] = rng.normal(size=(40, 3))
     log.passive_positions[:] = rng.uniform(-0.2, 0.2, log.passive_positions.shape)

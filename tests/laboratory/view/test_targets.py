@@ -20,7 +20,7 @@ from space_robot_model.robot import Robot
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_sim.environment.events import Capture, Release
 from space_robot_sim.environment.impact import Grasp
-from space_robot_sim.environment.neighbouring_orbit import fall, meet
+from space_robot_sim.environment.neighbouring_orbit import free_fall, target_state
 from space_robot_sim.environment.target import Target
 
 Array = NDArray[np.float64]
@@ -155,7 +155,7 @@ def test_a_target_on_an_orbit_falls_as_the_plant_has_it(
     place = held_poses(grasp, log.rows(30, 31), paper_robot)[0][0]
     target = meeting_target(orbit, 3.0, place, **motion)
     monkeypatch.setattr(drawing, "orbit_of", lambda log: orbit)
-    moving = target.model_copy(update={"motion": meet(target, orbit, 3.0).motion})
+    moving = target.model_copy(update={"motion": target_state(target, orbit, 3.0).motion})
     met = replace(Capture(3.0, target), target=moving) if is_reached else None
     monkeypatch.setattr(drawing, "_as_met", lambda event, log: met)
     scene = scene_of(log, paper_robot, monkeypatch, Capture(3.0, target))
@@ -167,7 +167,7 @@ def test_a_target_on_an_orbit_falls_as_the_plant_has_it(
         return Rotation.from_matrix(end @ start.T).as_rotvec() / TICK_S
 
     for time in (0.0, 1.0, 2.8):
-        truth = meet(target, orbit, time)
+        truth = target_state(target, orbit, time)
         np.testing.assert_allclose(box(time).position, truth.position, atol=1e-6)
         found = rate(box(time).rotation, box(time + TICK_S).rotation)
         np.testing.assert_allclose(found, truth.motion.angular_velocity, atol=0.02)
@@ -177,6 +177,6 @@ def test_a_target_on_an_orbit_falls_as_the_plant_has_it(
         found = rate(box(2.9).rotation, scene.poses(3.0 + 1e-3)[held[0]].rotation)
         np.testing.assert_allclose(found, met.target.motion.angular_velocity, atol=0.02)
     else:
-        axes = rotations(fall(target, orbit, np.array([0.0, 4.0]))[1])
+        axes = rotations(free_fall(target, orbit, np.array([0.0, 4.0]))[1])
         turned = box(4.0).rotation @ box(0.0).rotation.T
         np.testing.assert_allclose(turned, axes[1] @ axes[0].T, atol=1e-6)

@@ -238,7 +238,7 @@ def test_wheels_accelerate_like_rotors_on_hinges(n: int, count: int, seed: int) 
 def test_motors_accelerate_like_bodies_on_links(n: int, share: float, seed: int) -> None:
     """In chains of ``n`` joints, or in a tree; each rotor's own acceleration. Some are held."""
     rng = np.random.default_rng(seed)
-    robot = random_robot(rng, n) if n else Robot.of_tree(random_tree(rng, TREE))
+    robot = random_robot(rng, n) if n else Robot.from_tree(random_tree(rng, TREE))
     robot = random_gears(rng, robot)
     rotors, n, scale = random_motor_rotors(rng, robot), robot.joint_count, turns(robot)
     count, state, model = len(rotors), random_state(rng, n), mounted(robot)

@@ -16,13 +16,12 @@ from hypothesis import strategies as st
 from paths import CONFIG, DATA
 
 from space_robot.flight.plan import Flight, FlightPlan, resolve
-from space_robot_control.controller.gains import gain_files
-from space_robot_control.controller.settings import ControllerNodeSettings, set_file
+from space_robot_control.controller.settings import ControllerNodeSettings, gain_files, set_file
 from space_robot_control.laws import laws
 from space_robot_model.robot.find import (
     RobotChoice,
     find_robot,
-    mission_file,
+    mission_layers,
     new_command,
     robot_as_path,
     robot_files,
@@ -90,7 +89,7 @@ def test_a_folder_is_a_robot(folder: Path, name: str, monkeypatch: pytest.Monkey
     monkeypatch.chdir(folder.parent)
     found = robot_files(name)
     assert found.name == "mine"
-    assert mission_file(name).samefile(folder / "mission.yaml")
+    assert mission_layers(name, "")[0].samefile(folder / "mission.yaml")
     assert gain_files(name, "default")["ctc"].samefile(folder / "gains/tuned/ctc.yaml")
     assert Flight(resolve(FlightPlan(robot=name, duration=0.1))).description["mission"] == "mine"
 

@@ -18,7 +18,7 @@ from scipy.spatial.transform import Rotation
 from strategies import random_robot, random_robot_file, random_tree
 
 from space_robot_model.robot import Robot
-from space_robot_model.robot.files import document_of
+from space_robot_model.robot.files import readable_document
 from space_robot_model.robot.find import find_robot
 from space_robot_model.robot.inertia import inertia_tensor
 from space_robot_model.robot.parts import Base, Body, JointLimits, RobotTree
@@ -130,7 +130,7 @@ def same(one: Robot, other: Robot) -> None:
 
 @given(st.integers(0, 2**32 - 1))
 def test_trees_come_back_to_the_bit(seed: int) -> None:
-    tree = Robot.of_tree(random_tree(np.random.default_rng(seed), SOME_KINDS))
+    tree = Robot.from_tree(random_tree(np.random.default_rng(seed), SOME_KINDS))
     for robot in (tree, tree.nominal, random_robot(np.random.default_rng(seed), 3)):
         content = json.loads(json.dumps(robot.content))
         again = Robot.from_dict(content)
@@ -160,7 +160,7 @@ def test_a_robot_file_made_of_a_robot_has_its_limits(paper_robot: Robot) -> None
         *paper_robot.limits[4:],
     ]
     robot = replace(paper_robot, limits=tuple(limits))
-    again = Robot.from_dict(json.loads(json.dumps(document_of(robot.tree))))
+    again = Robot.from_dict(json.loads(json.dumps(readable_document(robot.tree))))
     for before, after in zip(robot.limits, again.limits, strict=True):
         assert after == pytest.approx(before)
 
@@ -171,7 +171,7 @@ def test_shapes_are_part_of_the_numbers() -> None:
     assert {shape.shape for shape in robot.visuals} >= {"box", "cylinder", "sphere", "mesh"}
     exact = Robot.from_dict(json.loads(json.dumps(robot.content)))
     assert repr(exact.visuals) == repr(robot.visuals)
-    written = Robot.from_dict(yaml.safe_load(yaml.safe_dump(document_of(robot.tree))))
+    written = Robot.from_dict(yaml.safe_load(yaml.safe_dump(readable_document(robot.tree))))
     for before, after in zip(robot.visuals, written.visuals, strict=True):
         assert (after.shape, after.body, after.size) == (before.shape, before.body, before.size)
         assert (after.mesh, after.colour) == (before.mesh, before.colour)

@@ -18,7 +18,7 @@ from urdf_defects import DEFECTS, GOOD
 from space_robot_model.robot import Robot
 from space_robot_model.robot.inertia import nearest_inertia
 from space_robot_model.robot.parts import MOST_LINKS, JointFriction, JointLimits, Spring
-from space_robot_model.robot.urdf import MOST_MOVING, parse_urdf, read_urdf
+from space_robot_model.robot.urdf import MOST_MOVING, read_urdf
 from space_robot_model.robot.urdf_links import mesh_path
 from space_robot_msgs_py.errors import InputError
 
@@ -60,7 +60,7 @@ def test_a_defect_is_one_line_with_the_repair_which_leaves_a_robot(name: str, pa
     assert str(first).startswith(f"line {defect.line}: {defect.part}: ")
     assert defect.repair in first.repair
     assert "\n" not in "".join(map(str, found.findings))
-    robot = Robot.of_tree(found.tree)
+    robot = Robot.from_tree(found.tree)
     assert robot.n == (1 if "locked" in first.repair else 2)
 
 
@@ -101,7 +101,7 @@ def test_next_to_no_mass_has_no_inertia(path: Path) -> None:
     path.write_text(GOOD.replace('<mass value="10"/>', '<mass value="1e-12"/>'))
     found = read_urdf(path, repair=True)
     assert [finding.repair.split()[-1] for finding in found.findings] == ["'upper'", "ignored"]
-    robot = Robot.of_tree(found.tree)
+    robot = Robot.from_tree(found.tree)
     assert_allclose(np.linalg.eigvalsh(robot.inertia[1]), [0.5, 1.9, 2.1])
 
 
@@ -139,7 +139,7 @@ def test_tools_are_ordered_by_the_joints_before_them(path: Path) -> None:
     path.write_text(GOOD.replace('<link name="upper">', camera))
     assert [tool.name for tool in Robot.from_urdf(path).tools] == ["hand", "camera"]
     chosen = read_urdf(path, tools=["upper", "camera"])
-    robot = Robot.of_tree(chosen.tree)
+    robot = Robot.from_tree(chosen.tree)
     assert [(tool.name, tool.body) for tool in robot.tools] == [("upper", 1), ("camera", 0)]
     with pytest.raises(InputError, match="unknown link 'x' for a tool"):
         read_urdf(path, tools=["x"])
@@ -186,6 +186,8 @@ def test_a_yaml_is_read_in_its_folder_or_has_the_text(tmp_path: Path) -> None:
     robot = Robot.from_yaml(tmp_path / "robot.yaml")
     assert (robot.name, robot.mass[0]) == ("mine", 10.0)
     text = GOOD.replace('upper="2"', 'upper="-2"')
+    with pytest.raises(InputError, match="with --repair"):
+        Robot.from_dict({"robot": {"urdf_text": text}})
     repaired = Robot.from_dict({"robot": {"urdf_text": text, "repair": True}})
     assert (len(repaired.repairs), repaired.limits[0].lower) == (1, -2.0)
 
@@ -297,4 +299,4 @@ def test_links_are_counted_before_one_is_read(
 
     monkeypatch.setattr("space_robot_model.robot.urdf.read_links", read)
     with pytest.raises(InputError, match=said):
-        parse_urdf(text, Path("my.urdf"))
+        read_urdf(Path("my.urdf"), text=text)

@@ -33,8 +33,7 @@ from space_robot_model.robot.find import find_robot
 from space_robot_model.robot.flatten import SETTINGS_FRICTION
 from space_robot_model.robot.inertia import SLENDER, inertia_tensor
 from space_robot_model.robot.parts import Base, Body, Visual
-from space_robot_model.robot.urdf import UrdfRobot, parse_urdf, read_urdf
-from space_robot_model.robot.urdf_mount import Mount, mounted_urdf
+from space_robot_model.robot.urdf import Mount, UrdfRobot, mounted_urdf, read_urdf
 from space_robot_model.robot.urdf_tree import solid_inertia
 from space_robot_msgs_py.errors import InputError
 
@@ -105,10 +104,10 @@ def test_shapes_and_frames_are_where_pinocchio_has_them(seed: int, count: int) -
         for shape in shapes.geometryObjects
     }
     links = [f"link{k}" for k in range(count + 1)]
-    masses = [part.name for part in parts(parse_urdf(text, FILE)) if part.mass]
+    masses = [part.name for part in parts(read_urdf(FILE, text=text)) if part.mass]
     for base in ("link0", str(rng.choice(masses))):
-        found = parse_urdf(text, FILE, base, tools=links)
-        robot = Robot.of_tree(found.tree)
+        found = read_urdf(FILE, base, tools=links, text=text)
+        robot = Robot.from_tree(found.tree)
         poses = body_poses(robot, np.array([angles[name] for name in robot.joint_names]))
         tools = [poses[t.body] * pin.SE3(t.rotation, t.position) for t in robot.tools]
         assert [tool.name for tool in robot.tools] == links
@@ -145,7 +144,7 @@ def test_a_mounted_arm_is_pinocchios_of_a_urdf_written_by_hand(
     mount = Mount(file, xyz=xyz, rpy=rpy) if has_file else Mount(None, 300.0, inertia, xyz, rpy)
     mounted = mounted_urdf(DATA / "ground_arm.urdf", mount, repair=False)
     assert mounted.name == ("ground_arm_on_sat" if has_file else "ground_arm_on_satellite")
-    robot = Robot.of_tree(parse_urdf(mounted.text, FILE).tree)
+    robot = Robot.from_tree(read_urdf(FILE, text=mounted.text).tree)
     assert robot.joint_names == ("shoulder", "elbow")
     arm = (DATA / "ground_arm.urdf").read_text("utf-8").replace('"base_link"', '"foot"')
     seat = f'<origin xyz="{words(list(xyz))}" rpy="{words(list(rpy))}"/><parent link="{name}"/>'
@@ -165,7 +164,7 @@ def one_joint(limit: str, dynamics: str = "", inertia: str = "") -> UrdfRobot:
         f'<axis xyz="0 0 1"/>{limit}{dynamics}</joint>'
         '<joint name="glue" type="fixed"><parent link="arm"/><child link="plate"/></joint></robot>'
     )
-    return parse_urdf(text, FILE, repair=True)
+    return read_urdf(FILE, repair=True, text=text)
 
 
 INF = np.inf
@@ -294,7 +293,7 @@ def test_a_point_may_be_fixed_to_a_solid_body_only() -> None:
     assert not found.findings
     assert not found.tree.links[-1].inertia.any()
     moving = one_joint(LIMIT, inertia=point).text.replace('type="fixed"', 'type="continuous"')
-    repaired = parse_urdf(moving, FILE, repair=True)
+    repaired = read_urdf(FILE, repair=True, text=moving)
     assert [finding.part for finding in repaired.findings] == ["link 'plate'"]
     radius = (3.0 * 3.0 / (4.0 * np.pi * 1000.0)) ** (1.0 / 3.0)
     np.testing.assert_allclose(
@@ -410,7 +409,7 @@ def test_a_robot_or_one_line(path: Path, text: str | bytes, base: str | None) ->
         try:
             with np.errstate(all="raise", under="ignore"):
                 found = read_urdf(path, base, repair)
-                robot = Robot.of_tree(found.tree, where=str(path))
+                robot = Robot.from_tree(found.tree, where=str(path))
         except InputError as error:
             said = str(error)
             assert said.isprintable()

@@ -34,7 +34,7 @@ ROBOTS = [*robot_names(), str(DATA / "arm.urdf")]
 def limited_tree(seed: int, kinds: list[str]) -> Robot:
     """Any tree; limits of its joints are there in part."""
     rng = np.random.default_rng(seed)
-    robot = Robot.of_tree(random_tree(rng, kinds))
+    robot = Robot.from_tree(random_tree(rng, kinds))
     limits = [_random_limits(rng) for _ in range(robot.n)]
     return replace(robot, limits=tuple(limits))
 
@@ -189,7 +189,7 @@ def robot_of(base: str, link: str, tool: str, visuals: Sequence[Visual] = ()) ->
     """A base and a link on a joint called as it is."""
     tools = [Tool(tool, position=np.ones(3), link=link), Tool(tool, link=link)]
     hull, own = Base(9.0, np.eye(3), name=base), [replace(visual, link=link) for visual in visuals]
-    return Robot.of_tree(
+    return Robot.from_tree(
         RobotTree("two", hull, [link_of(link, base, link)], tools=tools, visuals=own)
     )
 
@@ -228,7 +228,9 @@ def test_every_name_of_a_urdf_is_there_once(
     frames = [
         Tool(tool, position=np.ones(3), link=name) for tool, name in zip(tools, bodies, strict=True)
     ]
-    robot = Robot.of_tree(RobotTree("three", Base(2.0, np.eye(3), name=base), links, tools=frames))
+    robot = Robot.from_tree(
+        RobotTree("three", Base(2.0, np.eye(3), name=base), links, tools=frames)
+    )
     text, names = urdf_text(robot), frame_names(robot)
     root = ElementTree.fromstring(text)
     links, fixed = ([e.attrib["name"] for e in root.iter(tag)] for tag in ("link", "joint"))
@@ -255,7 +257,7 @@ def test_frames_are_named_as_ros_does(
     body: str, joint: str, link: str, base: str, root: str
 ) -> None:
     hull, tool = Base(2.0, np.eye(3), name=base), Tool(body, position=np.ones(3), link=body)
-    robot = Robot.of_tree(RobotTree("two", hull, [link_of(body, base, joint)], tools=[tool]))
+    robot = Robot.from_tree(RobotTree("two", hull, [link_of(body, base, joint)], tools=[tool]))
     names = frame_names(robot)
     assert names.bodies == (root, link)
     assert names.tools == (f"{body}_tool",)

@@ -18,6 +18,7 @@ from bags import (
     assert_same_flight,
     entries_of,
     mcap_of,
+    messages_in,
     messages_of,
     record,
     rosbags_bag,
@@ -143,7 +144,7 @@ def test_split_bag_and_chunks_in_another_order_are_one_flight(
 
 
 def test_messages_of_the_sample_are_those_that_rosbags_reads() -> None:
-    ours = list(open_bag(SAMPLE).messages(*topics.ALL))
+    ours = list(messages_in(SAMPLE))
     with Reader(SAMPLE) as reader:
         theirs = [(c.topic, bytes(raw)) for c, _, raw in reader.messages()]
     for topic in topics.ALL:

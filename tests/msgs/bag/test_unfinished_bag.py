@@ -23,7 +23,6 @@ from bags import (
 )
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from mcap.reader import make_reader
 
 from space_robot.analysis import analyze
 from space_robot.flight.plan import Flight, FlightPlan, resolve
@@ -147,9 +146,7 @@ def test_full_disk_keeps_what_fitted_and_stops_nobody(
     assert f"messages not kept: {recorder.unkept}" in str(raised.value)
     assert str(bag) in str(raised.value)
     assert recorder.received == len(messages)
-    with mcap_file(bag).open("rb") as file:  # a valid MCAP file, for any tool
-        readable = len(list(make_reader(file).iter_messages(log_time_order=False)))
-    assert readable == len(messages) - recorder.unkept
+    assert sum(open_bag(bag).counts().values()) == len(messages) - recorder.unkept
     if recorder.kept_tick < 0:
         assert "last tick kept: none" in str(raised.value)
         with pytest.raises(InputError, match="not finished"):

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 import yaml
 
-from space_robot_control.controller.gains import build_law, gain_files, read_gains
-from space_robot_control.controller.settings import ControllerNodeSettings
+from space_robot_control.controller.gains import build_law, read_gains
+from space_robot_control.controller.settings import ControllerNodeSettings, gain_files
 from space_robot_control.guidance.mission import MissionNodeSettings
 from space_robot_control.laws import laws
 from space_robot_msgs_py.bag.recorder import RecorderNodeSettings

@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 from pydantic import Field
 
 from space_robot_msgs_py.config.arguments import as_numbers, as_path, as_whole_number, path_text
-from space_robot_msgs_py.config.installation import extra_packages, install_command
+from space_robot_msgs_py.config.installation import install_command
 from space_robot_msgs_py.config.text import (
     MOST_LISTED,
     choices,
@@ -146,8 +146,8 @@ def test_a_command_names_the_packages_of_its_extra(monkeypatch: pytest.MonkeyPat
         assert all(re.match(r"[a-z]", word) for word in words[2:]), words
     monkeypatch.setattr(importlib.metadata, "requires", lambda name: REQUIREMENTS)
     assert install_command("view") == "pip install 'viser>=1.1' 'trimesh[easy]>=4'"
-    assert extra_packages("docs") == ["pymdown-extensions<12"]
-    assert extra_packages("vie") == extra_packages("view.") == []
+    assert install_command("docs") == "pip install 'pymdown-extensions<12'"
+    assert install_command("vie") == "pip install -e '.[vie]' in the folder of space_robot"
 
     def requires(name: str) -> list[str]:
         raise importlib.metadata.PackageNotFoundError(name)

@@ -222,15 +222,16 @@ def test_the_process_sleeps_until_the_first_node_is_to_be_stepped(
     assert all(scheduler.take() for _ in range(2))
     assert (slow.loop.steps, fast.loop.steps, idle.loop.steps) == (1, 2, 0)
     assert clock.slept == pytest.approx([0.2, 0.2], abs=1e-4)
-    mine, other = Node(Wait(0.5, (INPUT,))), Node(Wait(0.3, ("another",)))  # type: ignore[arg-type]
+    inputs: Any = [SimpleNamespace(handle=name) for name in ("one", "another")]
+    mine, other = Node(Wait(0.5, (inputs[0],))), Node(Wait(0.3, (inputs[1],)))
     scheduler, waits = scheduler_of(mine, other), list[tuple[list[Any], float]]()
 
-    def wait(inputs: list[Any], timeout_s: float) -> None:
-        waits.append((inputs, timeout_s))
+    def wait(handles: list[Any], timeout_s: float) -> None:
+        waits.append((handles, timeout_s))
 
     monkeypatch.setattr(scheduler._waiter, "wait", wait)
     assert all(scheduler.take() for _ in range(2))
-    assert [inputs for inputs, _ in waits] == [[INPUT, "another"]] * 2
+    assert [handles for handles, _ in waits] == [["one", "another"]] * 2
     assert waits[0][1] == pytest.approx(0.3, abs=1e-4)
     assert (mine.loop.steps, other.loop.steps) == (2, 2), "who waits is looked at after it"
     assert len(clock.slept) == 2

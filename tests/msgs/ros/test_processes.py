@@ -24,7 +24,7 @@ from space_robot_msgs_py.ros.locks import (
     Holder,
     commands_in,
     domain_lock,
-    newest_node,
+    living_nodes,
     node_lock,
     nodes_in,
 )
@@ -258,18 +258,18 @@ def test_every_node_of_every_domain_has_its_own_lock(
 
 
 def test_the_node_that_began_last() -> None:
-    assert newest_node("plant_node") is None
+    assert next(living_nodes("plant_node"), None) is None
     begun = [(7, "/plant_node"), (12, "/fleet/sat1/plant_node"), (3, "/own_plant_node")]
     held = []
     for age, (domain, name) in enumerate(begun):
         path = node_lock(domain, name)
         held.append(FileLock(path, "plant_node"))
         os.utime(path, (0, age))
-    assert newest_node("plant_node") == (12, "/fleet/sat1")
-    assert newest_node("plant_node", "/") == (7, "/")
-    assert newest_node("plant_node", "/sat1") is None
+    assert next(living_nodes("plant_node"), None) == (12, "/fleet/sat1")
+    assert next(living_nodes("plant_node", "/"), None) == (7, "/")
+    assert next(living_nodes("plant_node", "/sat1"), None) is None
     held[1].release()
-    assert newest_node("plant_node") == (7, "/")
+    assert next(living_nodes("plant_node"), None) == (7, "/")
     for lock in (held[0], held[2]):
         lock.release()
-    assert newest_node("plant_node") is None
+    assert next(living_nodes("plant_node"), None) is None

@@ -124,7 +124,7 @@ def test_a_robots_own_friction_comes_before_the_settings() -> None:
 def test_a_stuck_joint_is_the_one_named(seed: int, kinds: list[str]) -> None:
     """Of a tree, in which passive joints and other branches come before it; and it comes free."""
     tree = random_tree(np.random.default_rng(seed), ["revolute", *kinds])
-    robot = Robot.of_tree(tree)
+    robot = Robot.from_tree(tree)
     names = RobotNames(robot.joint_names, passive=robot.passive_names)
     environment = Environment.build(EnvironmentSettings(), Installation(robot.n, robot=robot))
     friction = environment.friction

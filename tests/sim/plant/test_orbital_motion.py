@@ -40,7 +40,7 @@ from space_robot_model.orbit.elements import state_of
 from space_robot_model.robot import Robot
 from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.samples import RobotState
-from space_robot_sim.environment.neighbouring_orbit import fall, hill_axes, meet
+from space_robot_sim.environment.neighbouring_orbit import free_fall, hill_axes, target_state
 from space_robot_sim.environment.orbit import OrbitSettings
 from space_robot_sim.environment.target import Target
 from space_robot_sim.plant.plant import Plant
@@ -165,7 +165,7 @@ def test_what_is_met_is_held_with_the_momenta_of_both(
     for name in ("base_position", "quaternion", "joint_positions"):
         np.testing.assert_array_equal(getattr(after, name), getattr(before, name))
     assert np.abs(after.joint_velocities - before.joint_velocities).max() > 1e-2
-    meeting = meet(target, ORBIT, CAPTURE * PERIOD)
+    meeting = target_state(target, ORBIT, CAPTURE * PERIOD)
     # the target is a little beside its place: its momentum about the origin is that of the place
     place, axes = held_place(paper_robot, before, target)
     np.testing.assert_allclose(place, meeting.position, rtol=0.0, atol=1e-7)
@@ -242,7 +242,7 @@ def test_on_an_eccentric_orbit_it_is_scipys_path_less_the_points(has_j2: bool) -
     rate = np.cross(r, v) / (r @ r)
     start, speed = axes @ [2e3, -3e3, 1e3], axes @ [1.0, -2.0, 0.5]
     target = target_of(position=[2e3, -3e3, 1e3], velocity=[1.0, -2.0, 0.5])
-    meeting = meet(target, orbit, time)
+    meeting = target_state(target, orbit, time)
     (point,) = free_path(r, v, time, has_j2)
     (other,) = free_path(r + start, v + speed + np.cross(rate, start), time, has_j2)
     assert np.linalg.norm(other[:3] - point[:3]) > 1e3
@@ -276,7 +276,7 @@ def test_the_plant_flies_the_same_body_to_the_same_place(has_j2: bool) -> None:
         "reach": 0.7,
     }
     target = Target.from_dict({"target": {**content, "motion": motion}})
-    meeting = meet(target, orbit, ticks * period)
+    meeting = target_state(target, orbit, ticks * period)
     assert np.linalg.norm(meeting.position - axes @ start) > 50.0
     np.testing.assert_allclose(meeting.position, state.base_position, rtol=0.0, atol=1e-6)
     np.testing.assert_allclose(meeting.motion.velocity, state.base_velocity, rtol=0.0, atol=1e-8)
@@ -285,8 +285,8 @@ def test_the_plant_flies_the_same_body_to_the_same_place(has_j2: bool) -> None:
     np.testing.assert_allclose(meeting.motion.angular_velocity, spun, rtol=0.0, atol=1e-8)
     assert meeting.reach == 0.7
     times = np.array([0.0, 0.5, 30.0, 31.0, ticks * period])
-    positions, quaternions = fall(target, orbit, times)
-    met = [meet(target, orbit, time).position for time in times.tolist()]
+    positions, quaternions = free_fall(target, orbit, times)
+    met = [target_state(target, orbit, time).position for time in times.tolist()]
     np.testing.assert_allclose(positions, met, rtol=0.0, atol=1e-6)
     turned = rotation_of(state.quaternion).inv() * rotation_of(quaternions[-1])
     assert turned.magnitude() < 1e-6
@@ -306,5 +306,5 @@ def test_what_cannot_be_followed_is_refused_in_one_line(
     motion: dict[str, list[float]], orbit: OrbitSettings, said: str
 ) -> None:
     with pytest.raises(InputError, match=rf"target 'drifter': {said}") as caught:
-        meet(target_of(**motion), orbit, 1000.0)
+        target_state(target_of(**motion), orbit, 1000.0)
     assert "\n" not in str(caught.value)

@@ -169,7 +169,7 @@ TORQUE = np.array([60.0, -40.0, 50.0, 4.0, 9.0, -6.0])
 
 def tree(rng: np.random.Generator) -> Robot:
     """Turning, sliding and passive joints, some with gears."""
-    robot = random_gears(rng, Robot.of_tree(random_tree(rng, KINDS)))
+    robot = random_gears(rng, Robot.from_tree(random_tree(rng, KINDS)))
     return with_gears(robot, [gear and gear._replace(ratio=10.0) for gear in robot.gears])
 
 

@@ -16,7 +16,7 @@ from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.samples import STATE_FIELDS, Command, RobotNames, RobotState, Timebase
 from space_robot_msgs_py.wire.codecs import StateCodec
 from space_robot_sim.faults.messages import MessageFaults
-from space_robot_sim.plant.messages import NONE, CommandGuard, PlantMessages, SentState
+from space_robot_sim.plant.messages import NO_TICK, CommandGuard, PlantMessages, SentState
 from space_robot_sim.plant.plant import Plant
 from space_robot_sim.plant.report import ActuatorHealth
 from space_robot_sim.plant.settings import FaultSettings, PlantNodeSettings, PlantSettings
@@ -245,12 +245,13 @@ class Way:
             states = list(self.exchange.send(self.state))
             read = RobotState.allocate(len(self.state.joint_positions))
             sent.append([self._read(state, read) for state in states])
-            awaited.append([s.answered_by for s in states if s.answered_by != NONE])
+            awaited.append([s.answered_by for s in states if s.answered_by != NO_TICK])
             for stamp in awaited[-1]:
                 self.guard.offered.tick, self.guard.offered.torque[:] = stamp, stamp
                 self.exchange.take(tick)
             self.exchange.end(tick)
-            acting.append(int(self.guard.act(tick).torque[0]) if self.guard.answered >= 0 else NONE)
+            torque = self.guard.act(tick).torque
+            acting.append(int(torque[0]) if self.guard.answered >= 0 else NO_TICK)
         return sent, awaited, acting
 
     def _read(self, sent: SentState, state: RobotState) -> int:
@@ -276,14 +277,14 @@ def test_in_order_every_state_is_answered_and_every_command_acts(
     ("text", "sent", "awaited", "acting"),
     [
         ("drop_state@0.001-0.002", [[0], [1], [], [], [4]], None, [0, 1, 1, 1, 4]),
-        ("delay_state@0:2", [[], [], [0], [1], [2]], None, [NONE, NONE, 0, 1, 2]),
+        ("delay_state@0:2", [[], [], [0], [1], [2]], None, [NO_TICK, NO_TICK, 0, 1, 2]),
         ("repeat_state@0", [[0], [0, 1], [1, 2], [2, 3], [3, 4]], EACH[:5], TICKS[:5]),
         (
             "stamp_jump@0.001-0.0015",
             *([[0], [1], [1_000_002], [3], [4]], [[0], [1], [], [3], [4]], [0, 1, 1, 3, 4]),
         ),
         ("drop_command@0.001-0.002", EACH[:5], None, [0, 1, 1, 1, 4]),
-        ("delay_command@0:2", EACH[:5], None, [NONE, NONE, 0, 1, 2]),
+        ("delay_command@0:2", EACH[:5], None, [NO_TICK, NO_TICK, 0, 1, 2]),
         ("nan_command@0.001-0.002", EACH[:5], None, [0, 1, 1, 1, 4]),
         ("repeat_command@0", EACH[:5], None, TICKS[:5]),
     ],

@@ -51,7 +51,7 @@ class Node:
     def start(self) -> None:
         self.loop = object.__new__(PlantLoop)
         self.loop.control = RunControl()
-        self.loop.tell_paused = lambda: self.told.append(self.control.is_paused)  # type: ignore[method-assign]
+        self.loop.report_pause = lambda: self.told.append(self.control.is_paused)  # type: ignore[method-assign]
         self.is_active, self.starts = True, self.starts + 1
 
     async def restart(self, others: list[str]) -> None:

@@ -226,6 +226,7 @@ def test_each_bench_has_the_states_of_the_bench_alone() -> None:
     many, alone = sr.bench_many(benched()), [scenario.bench() for scenario in benched()]
     for seed in (None, 7):
         states = many.reset(seed)
+        assert not many.ticks.any()
         for k, bench in enumerate(alone):
             bench.reset(None if seed is None else seed + k)
         tick = 0

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from bags import entries_of, rosbags_bag
+from bags import entries_of, messages_in, rosbags_bag
 from flights import planned, simulated, space_robot_here
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -50,7 +50,7 @@ def copied(bag: Path, copy: Path, keeps: Callable[[str, int], bool], **flight: A
     """Another recorder's bag of those messages that it ``keeps``, by topic and number from 1."""
     recorder = BagRecorder(copy, flight, Recording(bag).timebase)
     counts = dict.fromkeys(topics.BY_NAME, 0)
-    for name, data in open_bag(bag).messages(*topics.ALL):
+    for name, data in messages_in(bag):
         counts[name] += 1
         if keeps(name, counts[name]):
             recorder.record(topics.BY_NAME[name], data, 1, counts[name])
@@ -69,7 +69,7 @@ def test_states_and_references_come_as_recorded(bag: Path, tmp_path: Path) -> No
     assert (recording.first_gap, recording.lost_commands) == (math.inf, 0)
     assert ticks_of(recording) == list(range(400))
     assert ticks_of(recording, 100, 300) == list(range(100, 300))
-    recorded = [data for _, data in open_bag(bag).messages(topics.BASE_STATE)]
+    recorded = [data for _, data in messages_in(bag, topics.BASE_STATE)]
     assert [state.messages[1] for state in recording.states(STATES)] == recorded
     lost = {("/joint_states", 11), ("/base/state", 21)}
     halves = copied(bag, tmp_path / "holes", lambda name, number: (name, number) not in lost)
@@ -96,7 +96,7 @@ def test_topics_of_other_names_are_remapped(bag: Path, tmp_path: Path) -> None:
             topic.full_name: writer.add_connection(f"/arm{topic.full_name}_1", topic.type, **store)
             for topic in topics.ALL
         }
-        for number, (name, data) in enumerate(open_bag(bag).messages(*topics.ALL)):
+        for number, (name, data) in enumerate(messages_in(bag)):
             writer.write(connections[name], number, data)
     with pytest.raises(InputError, match=r"on /joint_states \(it has /arm/command_1, /arm/j"):
         Recording(tmp_path / "bag")

@@ -12,9 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from space_robot_model.elementary.matrices import product, unit_rows
-from space_robot_model.hardware.base_actuators import BaseActuatorSettings
-from space_robot_model.hardware.thrusters import ThrusterSettings
-from space_robot_model.hardware.wheels import WheelSettings
+from space_robot_model.hardware.base_actuators import (
+    BaseActuatorSettings,
+    ThrusterSettings,
+    WheelSettings,
+)
 from space_robot_model.robot.placements import to_base, to_inertial
 from space_robot_msgs_py.errors import InputError
 

@@ -1,7 +1,8 @@
-"""The flight code in C, compiled: states in, commands out, through its interface.
+"""The flight code in C, running: as a library in this process, or on a flight computer.
 
-In this process it is a library, built by the system's C compiler and kept in the cache of compiled
-kernels.
+The library is built by the system's C compiler and kept in the cache of compiled kernels. A flight
+computer is a program that answers by UDP, one datagram for each request and each answer:
+examples/flight_computer has the other side.
 """
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ import ctypes
 import hashlib
 import os
 import shutil
+import socket
 import subprocess
 import tempfile
 from abc import ABC, abstractmethod
@@ -22,7 +24,7 @@ from numpy.typing import NDArray
 
 from space_robot_msgs_py.compiled.cache import cache_directory
 from space_robot_msgs_py.compiled.records import Block, assign
-from space_robot_msgs_py.errors import InputError
+from space_robot_msgs_py.errors import FlightError, InputError
 from space_robot_msgs_py.samples import RobotState
 
 from ..controller.tick import STATUSES
@@ -33,6 +35,12 @@ Array = NDArray[np.float64]
 CONDITION = ("reason", "mode", "answered", "last_stamp", "is_new_time", *["rejected"] * STATUSES)
 """Numbers of ``space_robot_condition``."""
 COMPILERS = ("cc", "gcc", "clang")
+TIMEOUT_S = 2.0
+"""Longest wait for a flight computer's answer, s of the wall clock."""
+LARGEST = 65_507
+"""Bytes of a datagram at most."""
+BEGIN, JUDGE, ANSWER, USE, DEACTIVATE = range(5)
+"""Kinds of requests."""
 
 
 class FlightCode(ABC):
@@ -44,41 +52,34 @@ class FlightCode(ABC):
         self._measurement: NDArray[Any] = np.zeros(1, exported.measurement_type)
         self._reference: NDArray[Any] = np.zeros(1, exported.reference_type)
         self._command: NDArray[Any] = np.zeros(1, exported.command_type)
-        self._condition = np.zeros(len(CONDITION))
-        self._telemetry = np.zeros((4, exported.software.joints + 3))
+        self.command: Array = self._command["command"][0]
+        """The command of the last answer, as `Command.torque`."""
+        self.condition = np.zeros(len(CONDITION))
+        """The numbers of `CONDITION`."""
+        self.telemetry = np.zeros((4, exported.software.joints + 3))
+        """s, u, N_hat and e of the last tick, (4, m)."""
 
     @abstractmethod
+    def _ask(self, kind: int, tick: int) -> int:
+        """Send a request, receive command, condition and telemetry, and return the status."""
+
     def judge_stamp(self, tick: int) -> int:
         """Return the status of a state's stamp."""
+        return self._ask(JUDGE, tick)
 
-    @abstractmethod
     def answer(self, state: RobotState, reference: Block) -> int:
         """Answer a state that was judged to be new; return its status."""
+        fill_measurement(self._measurement, state)
+        fill_reference(self._reference, reference)
+        return self._ask(ANSWER, state.tick)
 
-    @abstractmethod
-    def stand_down(self, tick: int) -> None:
-        """Have the flight end with the command for that."""
+    def deactivate(self, tick: int) -> None:
+        """End the flight with zero torque."""
+        self._ask(DEACTIVATE, tick)
 
     @abstractmethod
     def use(self, law: ControlLaw) -> None:
         """Let a law take over if another one is in force."""
-
-    @property
-    def command(self) -> Array:
-        """The command of the last answer, as `Command.torque`."""
-        command: Array = self._command["command"][0]
-        return command
-
-    @property
-    def telemetry(self) -> tuple[Array, Array, Array, Array]:
-        """s, u, N_hat and e of the last tick, (m,) each."""
-        s, u, n_hat, error = self._telemetry
-        return s, u, n_hat, error
-
-    @property
-    def condition(self) -> Array:
-        """The numbers of `CONDITION`."""
-        return self._condition
 
     def write_condition(self, record: Any) -> None:
         """Write the condition into a record of `Supervision`."""
@@ -91,16 +92,17 @@ class FlightCode(ABC):
 class FlightLibrary(FlightCode):
     """One instance of the flight software in C, in this process."""
 
-    def __init__(self, exported: Exported, compiler: str = "") -> None:
+    def __init__(self, exported: Exported) -> None:
         """Compile the software, or take it from the cache, and initialise its memory.
 
         Raises:
             InputError: there is no compiler, or it fails.
         """
         super().__init__(exported)
-        self._library = ctypes.CDLL(str(build_library(exported.sources, compiler=compiler)))
+        self._library = ctypes.CDLL(str(build_library(exported.sources)))
         self._library.space_robot_state_size.restype = ctypes.c_uint64
         self._library.space_robot_gains.restype = ctypes.POINTER(ctypes.c_double)
+        # whole doubles: the struct needs their alignment
         self._state = np.zeros(-(-self._library.space_robot_state_size() // 8))
         self._call("init")
 
@@ -111,26 +113,16 @@ class FlightLibrary(FlightCode):
         function = getattr(self._library, f"space_robot_{name}")
         return int(function(ctypes.c_void_p(self._state.ctypes.data), *pointers) or 0)
 
-    def judge_stamp(self, tick: int) -> int:
-        """Return the status of a state's stamp."""
-        return self._call("judge", ctypes.c_int64(tick))
-
-    def answer(self, state: RobotState, reference: Block) -> int:
-        """Answer a state that was judged to be new; return its status."""
-        return self._with(state, reference, "answer")
-
-    def step(self, state: RobotState, reference: Block) -> int:
-        """Judge and answer a state; return its status, or -1 if it is refused."""
-        return self._with(state, reference, "step")
-
-    def _with(self, state: RobotState, reference: Block, function: str) -> int:
-        fill_measurement(self._measurement, state)
-        fill_reference(self._reference, reference)
-        return self._call(function, self._measurement, self._reference, self._command)
-
-    def stand_down(self, tick: int) -> None:
-        """Write the command that ends a flight."""
-        self._call("stand_down", ctypes.c_int64(tick), self._command)
+    def _ask(self, kind: int, tick: int) -> int:
+        if kind == ANSWER:
+            status = self._call("answer", self._measurement, self._reference, self._command)
+            self._call("get_telemetry", self.telemetry)
+        elif kind == JUDGE:
+            status = self._call("judge", ctypes.c_int64(tick))
+        else:
+            status = self._call("stand_down", ctypes.c_int64(tick), self._command)
+        self._call("get_condition", self.condition)
+        return status
 
     def use(self, law: ControlLaw) -> None:
         """Take the gains of a law, and let it take over if another one is in force."""
@@ -138,23 +130,80 @@ class FlightLibrary(FlightCode):
         gains = self._library.space_robot_gains(
             ctypes.c_void_p(self._state.ctypes.data), place, ctypes.byref(count)
         )
-        numbers = np.concatenate([*law.gain_values.values(), np.zeros(0)])
+        numbers = np.concatenate([*law.gain_values.values(), np.zeros(0)])  # it may have no gains
         assert count.value == len(numbers)
         for k, number in enumerate(numbers):
             gains[k] = number
         self._call("choose_law", place)
 
-    @property
-    def telemetry(self) -> tuple[Array, Array, Array, Array]:
-        """s, u, N_hat and e of the last tick, (m,) each."""
-        self._call("get_telemetry", self._telemetry)
-        return super().telemetry
 
-    @property
-    def condition(self) -> Array:
-        """The numbers of `CONDITION`."""
-        self._call("get_condition", self._condition)
-        return self._condition
+class FlightComputer(FlightCode):
+    """The flight software in a program that answers by UDP."""
+
+    def __init__(self, exported: Exported, host: str, port: int) -> None:
+        """Connect, and have the program begin anew.
+
+        Raises:
+            InputError: nobody answers, or the program is for another robot.
+        """
+        super().__init__(exported)
+        self._request: NDArray[Any] = np.zeros(
+            1,
+            [
+                ("kind", np.int64),
+                ("law", np.int64),
+                ("measurement", self._measurement.dtype),
+                ("reference", self._reference.dtype),
+            ],
+        )
+        self._answer: NDArray[Any] = np.zeros(
+            1,
+            [
+                ("kind", np.int64),
+                ("tick", np.int64),
+                ("result", np.int64),
+                ("command", self._command.dtype),
+                ("condition", np.float64, self.condition.shape),
+                ("telemetry", np.float64, self.telemetry.shape),
+            ],
+        )
+        # one record: what is written into its parts is sent
+        self._measurement = self._request["measurement"]
+        self._reference = self._request["reference"]
+        self.command = self._answer["command"]["command"][0]
+        self.condition = self._answer["condition"][0]
+        self.telemetry = self._answer["telemetry"][0]
+        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self._socket.settimeout(TIMEOUT_S)
+        try:
+            self._socket.connect((host, port))
+            self._ask(BEGIN, 0)
+        except (OSError, FlightError) as error:
+            raise InputError(
+                f"controller_code udp:{host}:{port}: {error}; start the flight computer first"
+            ) from None
+
+    def _ask(self, kind: int, tick: int) -> int:
+        self._request["kind"], self._measurement["tick"] = kind, tick
+        try:
+            self._socket.send(self._request.tobytes())
+            data = self._socket.recv(LARGEST)
+        except OSError as error:
+            raise FlightError(f"the flight computer does not answer ({error})") from None
+        if len(data) != (size := self._answer.nbytes):
+            raise FlightError(
+                f"the flight computer answered {len(data)} bytes instead of {size}: "
+                "its code was exported for another robot or other actuators"
+            )
+        self._answer[:] = np.frombuffer(data, self._answer.dtype)
+        if (self._answer["kind"][0], self._answer["tick"][0]) != (kind, tick):
+            raise FlightError("the flight computer answered another request")
+        return int(self._answer["result"][0])
+
+    def use(self, law: ControlLaw) -> None:
+        """Let a law take over if another one is in force; its gains are the program's own."""
+        self._request["law"] = self._places[law.name]
+        self._ask(USE, 0)
 
 
 def fill_reference(wanted: NDArray[Any], reference: Block) -> None:
@@ -166,24 +215,19 @@ def fill_reference(wanted: NDArray[Any], reference: Block) -> None:
 def fill_measurement(measurement: NDArray[Any], state: RobotState) -> None:
     """Write a state into a ``space_robot_measurement``."""
     measurement["tick"] = state.tick
-    inside = measurement["state"]
+    inside = measurement["state"]  # sized for this robot, the state for the largest
     for name in inside.dtype.names or ():
         field = inside[name]
         field[0] = getattr(state, name)[: field.shape[1]]
 
 
 def find_compiler() -> str:
-    """Return the C compiler: ``CC``, or the first of `COMPILERS` that is there.
-
-    Raises:
-        InputError: there is none.
-    """
-    wanted = [os.environ["CC"]] if os.environ.get("CC") else list(COMPILERS)
-    for name in wanted:
-        if shutil.which(name):
-            return name
+    """Return the C compiler: ``CC``, or the first of `COMPILERS` that is there."""
+    names = [os.environ["CC"]] if os.environ.get("CC") else COMPILERS
+    if compiler := next(filter(shutil.which, names), None):
+        return compiler
     raise InputError(
-        f"no C compiler ({', '.join(wanted)}) was found: install gcc or clang, or set CC"
+        f"no C compiler ({', '.join(names)}) was found: install gcc or clang, or set CC"
     )
 
 
@@ -196,17 +240,16 @@ def write_sources(folder: Path, sources: Mapping[PurePosixPath, str]) -> list[st
     return [str(folder / path) for path in sorted(sources) if path.suffix == ".c"]
 
 
-def build_library(
-    sources: Mapping[PurePosixPath, str], flags: Sequence[str] = FLAGS, compiler: str = ""
-) -> Path:
+def build_library(sources: Mapping[PurePosixPath, str], flags: Sequence[str] = FLAGS) -> Path:
     """Return a shared library of sources, from the cache if it is there.
 
     Raises:
         InputError: there is no compiler, or it fails.
     """
-    compiler = compiler or find_compiler()
+    compiler = find_compiler()
     command = [compiler, *flags, "-shared", "-fPIC"]
     version = subprocess.run([compiler, "--version"], capture_output=True, check=False).stdout
+    # with another compiler or other flags the same text is another library
     digest = hashlib.sha256(version + repr(command).encode())
     for path, text in sorted(sources.items()):
         digest.update(f"{path}\0{text}\0".encode())
@@ -228,5 +271,5 @@ def build_library(
             reason = next((line for line in run.stderr.splitlines() if "error" in line), run.stderr)
             raise InputError(f"{compiler} cannot compile the flight code: {reason.strip()}")
         shutil.move(built, temporary := library.with_suffix(f".{os.getpid()}"))
-        os.replace(temporary, library)
+        os.replace(temporary, library)  # at once: another process may read it
     return library
