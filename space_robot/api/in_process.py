@@ -31,7 +31,7 @@ def fly_in_process(
         keep_log: False: only the metrics are kept.
 
     Raises:
-        InputError: the bag cannot be created, or memory is too small for a log.
+        InputError: the bag cannot be created, or there is no room for a log.
     """
     flight.check_in_process()
     if bag:

@@ -127,10 +127,11 @@ class Scenario(FlightPlan):
             bag: folder to record to, which must not exist.
             progress: called regularly with the simulated time, s; True: a progress line, in a
                 terminal or a notebook.
-            keep_log: False: only the metrics are kept, for flights too long for memory.
+            keep_log: False: only the metrics are kept. A log above 1 GB lies in files of the folder
+                for temporary ones.
 
         Raises:
-            InputError: see `check`; or the bag cannot be created, or memory is too small.
+            InputError: see `check`; or the bag cannot be created, or there is no room for a log.
         """
         if self.controller is None:
             raise InputError("controller is None, so there is nothing to fly: use bench()")

@@ -35,7 +35,7 @@ def fly_many(
 
     Args:
         scenarios: to be flown.
-        keep_log: False: only the metrics are kept, for flights too long or too many for memory.
+        keep_log: False: only the metrics are kept, for flights too many for memory.
         progress: called with the number of flights that are over; True: a progress line.
 
     Returns:

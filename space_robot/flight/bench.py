@@ -235,7 +235,7 @@ class FlightBench(RecordOwner):
         The log of a law's own steps has its telemetry.
 
         Raises:
-            InputError: nothing was flown or recorded; the log does not fit into memory; or the
+            InputError: nothing was flown or recorded; there is no room for the log; or the
                 state reached is not the bench's, whose plant was changed.
         """
         return self._flown().log

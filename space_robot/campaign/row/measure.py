@@ -41,7 +41,7 @@ COLUMNS = (
 )
 """Columns of series whose RMS and maximum every row has, and their bands over time."""
 SERIES = ("errors", "torques", "drift", "tool")
-"""The series with these columns."""
+"""The series with these columns; the last one is of missions that lead the tool."""
 FURTHER = (
     *(f"{torque}.{key}" for key in ("ripple", "ripple_fast") for torque in COLUMNS[3:6]),
     "half_cone.outside_band",
@@ -89,11 +89,13 @@ def needs_truth_only(require: Iterable[Requirement]) -> bool:
 
 def row_columns(flight: AnalysedLog) -> list[str]:
     """Return the columns of a row's bands."""
-    known = [name.rpartition(".")[0] for name in names(flight, SERIES)]
-    if not leads_tool(flight.log):
-        known = [name for name in known if name not in ("tool", "tool_rotation")]
+    known = [name.rpartition(".")[0] for name in names(flight, _series(flight))]
     matching = (name for pattern in COLUMNS for name in known if fnmatchcase(name, pattern))
     return list(dict.fromkeys(matching))
+
+
+def _series(flight: AnalysedLog) -> tuple[str, ...]:
+    return SERIES if leads_tool(flight.log) else SERIES[:-1]
 
 
 def measure(
@@ -131,9 +133,9 @@ def measure(
         else:
             values[name] = evaluate(flight, [metric], window)[0].get(metric, np.nan)
     sizes: list[tuple[int, dict[str, NDArray[np.float64]]]] = []
-    for name in SERIES:
+    for name in _series(flight):
         group = GROUPS[name]
-        if isinstance(group, SeriesGroup) and (name != "tool" or "tool" in columns):
+        if isinstance(group, SeriesGroup):
             sizes += [
                 (start, {c: size for c, size in own_sizes.items() if c in columns})
                 for start, own_sizes in group.sizes(flight)
