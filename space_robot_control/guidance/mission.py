@@ -155,8 +155,7 @@ class Mission:
         self.period = period
         """s, of a tick."""
         self._robot, limits = robot.nominal, settings.limits
-        # asked for when a segment needs it, so that `uses_orbit` can tell whether any did
-        planner = Planner(self._robot, joints, base.quaternion, limits, lambda: self.ephemeris)
+        planner = Planner(self._robot, joints, base.quaternion, limits, self._planned_with)
         self._planner, segments = planner, read_segments(settings.segments)
         self.pieces = planner.plan(0.0, joints, base, segments or [HoldSegment(hold=1.0)])
         """The planned segments; at least one."""
@@ -174,6 +173,10 @@ class Mission:
     def ephemeris(self) -> Ephemeris | None:
         """The orbit that the mission is planned with; None: none is known."""
         return Ephemeris(self._assumed_orbit) if self._assumed_orbit.has_orbit else None
+
+    def _planned_with(self) -> Ephemeris | None:
+        # asked for when a segment needs it, so that `uses_orbit` can tell whether any did
+        return self.ephemeris
 
     @property
     def uses_orbit(self) -> bool:

@@ -75,6 +75,10 @@ class RawPublisher:
         self.sent += 1
         self._publish(data)
 
+    def flush(self, timeout_s: float) -> None:
+        """Wait until all subscribers have acknowledged all sent messages."""
+        self._publisher.wait_for_all_acked(Duration(seconds=timeout_s))
+
     @property
     def listener_count(self) -> int:
         """Number of connected subscriptions."""
@@ -106,8 +110,7 @@ def flush(outputs: Sequence[RawPublisher], timeout_s: float) -> None:
     """Wait until all subscribers have acknowledged all messages sent by some publishers."""
     until = time.monotonic() + timeout_s
     for output in outputs:
-        left_s = max(0.0, until - time.monotonic())
-        output._publisher.wait_for_all_acked(Duration(seconds=left_s))
+        output.flush(max(0.0, until - time.monotonic()))
 
 
 NOT_COUNTED = (1 << 64) - 1

@@ -14,6 +14,7 @@ from typing import Any
 import pytest
 import yaml
 from flights import space_robot_here
+from paths import ROOT
 
 from space_robot.analysis.figures import style
 
@@ -70,7 +71,7 @@ def _leaves(key: str, value: Any) -> Iterator[str]:
 
 def _plain(text: str, folder: Path) -> Iterator[str]:
     """Yield lines without what differs from machine to machine, numbers to five digits."""
-    text = VERSIONS.sub("VERSION", text.replace(str(folder), "FOLDER"))
+    text = VERSIONS.sub("VERSION", text.replace(str(folder), "FOLDER").replace(str(ROOT), "ROOT"))
     for line in text.splitlines():
         if line.strip() and not PROGRESS.search(line) and not DIGESTS.search(line):
             yield FLOAT.sub(_rounded, line).rstrip()[:LONGEST]

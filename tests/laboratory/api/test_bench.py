@@ -275,11 +275,11 @@ def test_compiled_code_knows_the_blocks_of_another_process(
 ) -> None:
     pickled = pickle.dumps(midway)
     monkeypatch.setattr(records, "_LAYOUTS", {})
-    records._dtype.cache_clear()
+    records.Record.dtype.__func__.cache_clear()
     other = pickle.loads(pickled)
     for block in (other._plant.block, other.controller.block):
         assert records.layout_of(block.dtype) is not None
-    records._dtype.cache_clear()
+    records.Record.dtype.__func__.cache_clear()
 
 
 def test_a_copied_state_is_a_state_and_a_view_of_a_record_is_refused(midway: Bench) -> None:

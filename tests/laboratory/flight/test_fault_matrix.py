@@ -24,6 +24,7 @@ from flights import planned, space_robot_here
 from space_robot.flight.message_loop import MessageLoop
 from space_robot.flight.simulate import simulate
 from space_robot.scenario.faults import KINDS
+from space_robot_control.controller.tick import MODES
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_sim.faults.grammar import parse_faults
 from space_robot_sim.faults.schedule import Schedule, ScheduledFault
@@ -125,7 +126,7 @@ def seen(name: str) -> Seen:
             super().fly_tick()
             supervisor = self._answering.supervisor
             counts.update(plant=self._guard.refused, controller=supervisor.rejected)
-            safe = f"{supervisor.mode.value}: {supervisor.reason}"
+            safe = f"{MODES[supervisor.mode]}: {supervisor.reason}"
             for node, mode in (
                 ("controller", safe.removesuffix(": ")),
                 ("plant", NO_COMMAND if self._guard.is_safe else "nominal"),
