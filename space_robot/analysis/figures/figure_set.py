@@ -20,14 +20,13 @@ from ..external_torques import torques_by_source
 from ..momentum import momentum_of
 from ..pointing_budget import PointingBudget
 from ..words import flown
-from .base_actuators import momentum, thrusters, wheels
+from .base_actuators import deflections, momentum, thrusters, torques_from_outside, wheels
 from .base_torque import chatter, junctions
 from .flight_curves import FlightCurves
 from .overlay import base_pointing, errors_and_torques, latency_histogram, pointing
 from .ripple import ripple
 from .single_flight import control_results, desired_joints
 from .style import save_figure
-from .surroundings import deflections, torques_from_outside
 
 
 class SavedFigure(NamedTuple):
