@@ -14,7 +14,7 @@ from .measure import column_unit, describe, group_of
 from .series import GROUPS
 from .words import Report, analyzed, flown, law_of, notes, remarks, seen_through
 
-TABLE_V = ("rms", "rms_eq64", "variation", "chatter", "ripple")
+IN_RMS_TABLE = ("rms", "rms_eq64", "variation", "chatter", "ripple")
 """Statistics of the table of RMS."""
 WIDE = 1e4
 """Torque from which on all torques of a table are written with exponents: of diverged flights."""
@@ -75,7 +75,7 @@ def metrics_table(report: Report) -> Table:
     shown = [
         name
         for name in shown_names([report])
-        if not name.endswith(tuple(f".{key}" for key in TABLE_V))
+        if not name.endswith(tuple(f".{key}" for key in IN_RMS_TABLE))
         or not _is_of_table_v(name, report)
     ]
     return Table(
