@@ -116,7 +116,7 @@ def _groups_of(wanted: Collection[str]) -> list[MetricGroup]:
     groups = {}
     for name in wanted:
         if (group := group_of(name)) is None:
-            one_of(name, [template for _, template, _ in declared()], "metric")
+            one_of(name, [template for _, template, _ in all_metrics()], "metric")
         else:
             groups[group.name] = group
     return list(groups.values())
@@ -134,7 +134,7 @@ def names(flight: AnalysedLog, groups: Iterable[str] | None = None) -> Iterator[
             continue
 
 
-def declared() -> Iterator[tuple[MetricGroup, str, Definition]]:
+def all_metrics() -> Iterator[tuple[MetricGroup, str, Definition]]:
     """Yield group, pattern, unit and meaning of each metric."""
     for group in GROUPS.values():
         for name, quantity in group.describe():
@@ -144,14 +144,16 @@ def declared() -> Iterator[tuple[MetricGroup, str, Definition]]:
 @lru_cache(maxsize=4096)
 def group_of(name: str) -> MetricGroup | None:
     """Return the group of a metric; None: there is none, as of a user's own."""
-    matching = (group for group, template, _ in declared() if fnmatchcase(name, pattern(template)))
+    matching = (
+        group for group, template, _ in all_metrics() if fnmatchcase(name, pattern(template))
+    )
     return next(matching, None)
 
 
 @lru_cache(maxsize=4096)
 def describe(name: str) -> Definition:
     """Return unit and meaning of a metric; of an unknown one, such as a user's own, none."""
-    for _, template, quantity in declared():
+    for _, template, quantity in all_metrics():
         if fnmatchcase(name, pattern(template)):
             return quantity._replace(unit=quantity.unit.replace("{unit}", column_unit(name)))
     return Definition("", "")

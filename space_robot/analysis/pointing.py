@@ -207,16 +207,16 @@ def navigation(flight: AnalysedLog) -> TimeSeries | None:
     return TimeSeries(axes, values, "no telemetry was recorded")
 
 
-POSE = "of the end effector, true less desired"
+OF_POSE = "of the end effector, true less desired"
 
 
 @series(
     "end effector",
     {
-        "boresight": Definition("arcsec", f"direction of the z axis {POSE}", ALL),
-        "tool_attitude": Definition("arcsec", f"rotation {POSE}", ALL),
+        "boresight": Definition("arcsec", f"direction of the z axis {OF_POSE}", ALL),
+        "tool_attitude": Definition("arcsec", f"rotation {OF_POSE}", ALL),
         "tool_position": Definition(
-            "m", f"position {POSE}, the base at its true position in both", ALL
+            "m", f"position {OF_POSE}, the base at its true position in both", ALL
         ),
         "base_drift": Definition(
             "m", "of the base's centre of mass from where it began; nothing holds it", ALL

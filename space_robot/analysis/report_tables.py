@@ -18,7 +18,7 @@ IN_RMS_TABLE = ("rms", "rms_eq64", "variation", "chatter", "ripple")
 """Statistics of the table of RMS."""
 WIDE = 1e4
 """Torque from which on all torques of a table are written with exponents: of diverged flights."""
-OWN = "own metrics"
+OWN_METRICS = "own metrics"
 
 
 def rms_table(report: Report) -> Table:
@@ -109,13 +109,13 @@ def shown_names(reports: Sequence[Report]) -> list[str]:
     order = list(dict.fromkeys(group.title for group in GROUPS.values()))
     names = dict.fromkeys(name for report in reports for name in report["metrics"])
     shown = [name for name in names if describe(name).is_shown]
-    return sorted(shown, key=lambda name: [*order, OWN].index(title_of(name)))
+    return sorted(shown, key=lambda name: [*order, OWN_METRICS].index(title_of(name)))
 
 
 def title_of(name: str) -> str:
     """Return the title of a metric's group."""
     group = group_of(name)
-    return group.title if group else OWN
+    return group.title if group else OWN_METRICS
 
 
 def text_of(name: str, value: float) -> str:

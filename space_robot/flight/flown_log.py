@@ -20,7 +20,7 @@ from .plan import Flight
 
 Array = NDArray[np.float64]
 
-LARGE = 2**30
+MAPPED_FROM = 2**30
 """Bytes from which on a log lies in files, which have no names and go with it."""
 
 
@@ -31,7 +31,7 @@ def flight_log(flight: Flight, ticks: int | None = None) -> FlightLog:
         InputError: there is no room for its files.
     """
     ticks = flight.ticks if ticks is None else ticks
-    if (size := ticks * row_bytes(flight)) < LARGE:
+    if (size := ticks * row_bytes(flight)) < MAPPED_FROM:
         return empty_log(flight, 0, ticks)
     check_room(size, f"duration {ticks * flight.period:g} s")
     log = empty_log(flight, 0, ticks, mapped, flight.mission.chunk(0, 1))

@@ -197,7 +197,7 @@ def test_it_flies_among_seven_others(plan: Planned, flown: Get) -> None:
     assert len(blocks) == 1
     assert difference(blocks[0].log, expected.log) == ""
     assert blocks[0].log.laws == expected.log.laws
-    assert str(blocks[0].error or "") == expected.reason
+    assert blocks[0].ending.reason == expected.reason
     for left, wanted in zip(memory(flights[own]), memory(expected.flight), strict=True):
         assert left == wanted
 

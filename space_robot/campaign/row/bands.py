@@ -13,7 +13,7 @@ BINS = 100
 """Bins of a flight; a flight with fewer ticks has one bin per tick."""
 
 
-def bands(
+def largest_in_bins(
     blocks: Iterable[tuple[int, Mapping[str, Array]]], ticks: int
 ) -> dict[str, NDArray[np.float32]]:
     """Return the largest size of each column in each bin; bin k of K begins at ``k ticks // K``.

@@ -20,7 +20,7 @@ from ...flight.plan import Flight
 from ...flight.simulate import simulate
 from ..draws import Draws
 from ..study import Study
-from .measure import measure, needs_truth_only
+from .measure import measure_row, needs_truth_only
 from .row import REFUSED, Row, Task, Value
 
 LARGEST_LOGS = 2**30
@@ -133,7 +133,7 @@ class RowFlyer:
         if ending.error is None:
             study, own = self.study, of_mapping(self.study.metrics)
             row = replace(
-                row, **measure(log, flight.ticks, study.require, own, study.pointing)._asdict()
+                row, **measure_row(log, flight.ticks, study.require, own, study.pointing)._asdict()
             )
         return row.digested(flight.plant.truth.block.tobytes())
 

@@ -24,7 +24,7 @@ from ...analysis.torques import lacking_for_ripple
 from ...flight.flown_log import empty_log
 from ...flight.plan import Flight
 from ..study import Requirement
-from .bands import bands
+from .bands import largest_in_bins
 
 COLUMNS = (
     "attitude_angle",
@@ -98,7 +98,7 @@ def _series(flight: AnalysedLog) -> tuple[str, ...]:
     return SERIES if leads_tool(flight.log) else SERIES[:-1]
 
 
-def measure(
+def measure_row(
     log: FlightLog,
     ticks: int,
     require: Mapping[str, Requirement],
@@ -140,7 +140,7 @@ def measure(
                 (start, {c: size for c, size in own_sizes.items() if c in columns})
                 for start, own_sizes in group.sizes(flight)
             ]
-    of_columns = bands(sizes, ticks)
+    of_columns = largest_in_bins(sizes, ticks)
     return Measured(_finite(metrics), _finite(values), {name: of_columns[name] for name in columns})
 
 

@@ -12,7 +12,7 @@ from space_robot_msgs_py.compiled.lanes import WIDTH
 from space_robot_msgs_py.samples import ALL_FIELDS, ReferenceChunk, State
 from space_robot_sim.plant.tick import PlantMemory
 
-from ..flown_log import LARGE, columns_of, empty_log, mapped
+from ..flown_log import MAPPED_FROM, columns_of, empty_log, mapped
 from ..plan import Flight
 from .lane_loop import LaneLog, References
 
@@ -73,7 +73,7 @@ def _columns(flight: Flight, ticks: int, is_brief: bool) -> list[Array]:
 
     columns_of(flight, 1, asked, is_brief)
     counts = [WIDTH * ticks * int(np.prod(shape, dtype=int)) for shape in shapes]
-    room = mapped((sum(counts),)) if 8 * sum(counts) >= LARGE else np.empty(sum(counts))
+    room = mapped((sum(counts),)) if 8 * sum(counts) >= MAPPED_FROM else np.empty(sum(counts))
     parts = np.split(room, np.cumsum(counts)[:-1])
     return [part.reshape(WIDTH, ticks, *shape) for part, shape in zip(parts, shapes, strict=True)]
 

@@ -31,7 +31,7 @@ from space_robot.analysis.errors import (
 from space_robot.analysis.figures import ripple
 from space_robot.analysis.figures.flight_curves import FlightCurves
 from space_robot.analysis.figures.style import LineStyle
-from space_robot.analysis.measure import declared, label, names
+from space_robot.analysis.measure import all_metrics, label, names
 from space_robot.analysis.report_tables import comparison_table, rms_table
 from space_robot.analysis.spectrum import hann, segment_spectra
 from space_robot.analysis.torques import desired_torque, ripple_spectrum
@@ -121,7 +121,7 @@ def test_names_are_known_beforehand_and_each_is_declared_once() -> None:
         matching = describe(name)
         assert matching.text, name
         assert "{" not in matching.unit, name
-    patterns = [name for _, name, _ in declared()]
+    patterns = [name for _, name, _ in all_metrics()]
     assert len(set(patterns)) == len(patterns)
     assert (describe("joints_prismatic.max").unit, describe("joints_1_3.max").unit) == ("m", "rad")
     assert describe("force_prismatic.variation").unit == "N/s"

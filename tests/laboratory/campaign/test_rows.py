@@ -18,7 +18,7 @@ from space_robot.campaign.row.fly import RowFlyer
 from space_robot.campaign.row.measure import (
     Measured,
     check_requirements,
-    measure,
+    measure_row,
     planned,
     row_columns,
     row_metrics,
@@ -30,7 +30,7 @@ from space_robot_msgs_py.errors import InputError
 
 def numbers_of(flown: FlownFlight, **options: Any) -> Measured:
     require = {k: Requirement.model_validate(v) for k, v in options.pop("require", {}).items()}
-    return measure(flown.log, flown.log.ticks, require, **options)
+    return measure_row(flown.log, flown.log.ticks, require, **options)
 
 
 @pytest.fixture(scope="module")

@@ -38,7 +38,7 @@ def test_a_flight_in_memory_in_files_and_from_its_bag_is_the_same(
 ) -> None:
     """To the last bit, log and report; a log in files leaves none behind."""
     flown = simulate(Flight(resolve(PLAN)))
-    monkeypatch.setattr("space_robot.flight.flown_log.LARGE", 1000)
+    monkeypatch.setattr("space_robot.flight.flown_log.MAPPED_FROM", 1000)
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
     log = simulate(Flight(resolve(PLAN)), tmp_path / "bag")
     assert isinstance(log.quaternion, np.memmap)
