@@ -187,7 +187,7 @@ def test_brief_logs_have_what_metrics_need(options: dict[str, Any]) -> None:
 
 
 def test_logs_too_large_for_memory_lie_in_a_file(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("space_robot.flight.batch.lane_log.LARGE", 1000)
+    monkeypatch.setattr("space_robot.flight.batch.lane_log.MAPPED_FROM", 1000)
     for flown, flight in zip(
         FlightBatch(some(2, sensors="fine")).fly(), some(2, sensors="fine"), strict=True
     ):
