@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from space_robot_model.elementary.matrices import dot_rows, norms, unit_rows
 from space_robot_model.robot.placements import tool_pose
+from space_robot_msgs_py.bag.flight_log import BLOCK_TICKS
 
 from .analysed_log import ANGLES, AnalysedLog
 from .errors import (
@@ -113,7 +114,7 @@ def steadiness(flight: AnalysedLog) -> dict[str, float]:
     axis, band = np.array(flight.budget.axis), 3600.0 * flight.budget.band_deg
     ticks = window_ticks(flight.budget.window_s, flight.log.timebase.period)
     whole = flight.log.ticks // ticks * ticks
-    step = max(1, 60_000 // ticks) * ticks
+    step = max(1, BLOCK_TICKS // ticks) * ticks
     within, squares, largest = np.zeros(3), np.zeros(3), np.zeros(3)
     for start in range(0, flight.log.ticks, step):
         attitude = flight.attitude_errors(start, min(start + step, flight.log.ticks))

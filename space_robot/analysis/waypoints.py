@@ -26,18 +26,13 @@ SHORTEST_WATCH = 0.1
 """s of flight after a waypoint without which nothing can be said of settling there."""
 
 
-def reference_speed(log: FlightLog) -> Array:
-    """(N,) rad/s, the highest desired velocity of any joint."""
-    return reduce(np.maximum, (np.abs(column) for column in log.reference_joints[:, 1].T))
-
-
-def waypoint_ticks(log: FlightLog, speed: Array | None = None) -> NDArray[np.intp]:
+def waypoint_ticks(log: FlightLog) -> NDArray[np.intp]:
     """Return the rows at which all desired joint velocities vanish; both ends of a longer rest.
 
     Where none is exactly 0 at a tick, the slowest one counts. Of an arm that never moves it is the
-    first row. ``speed``: see `reference_speed` (None: computed here).
+    first row.
     """
-    speed = reference_speed(log) if speed is None else speed
+    speed: Array = reduce(np.maximum, (np.abs(own) for own in log.reference_joints[:, 1].T))
     highest = np.fmax.accumulate(speed)
     if not len(speed) or not highest[-1] > 0.0:
         return np.array([0])
