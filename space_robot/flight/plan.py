@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+from collections.abc import Iterator
 from functools import cached_property
 from typing import Any
 
@@ -54,6 +56,11 @@ class Flight:
         """Build a controller without memory, with ``law`` in force."""
         robot, actuators = self.scenario.robots.controller, self.scenario.assumed_actuators
         return Controller.from_settings(robot, law, self.controller_settings, actuators)
+
+    def stretches(self, longest: int) -> Iterator[tuple[int, int]]:
+        """Yield first tick and end of stretches of at most ``longest`` ticks without a swap."""
+        swaps = (tick for tick, _ in self.swaps if tick < self.ticks)
+        return itertools.pairwise(sorted({*range(0, self.ticks, longest), *swaps, self.ticks}))
 
     @property
     def controls_base(self) -> bool:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Callable
 from pathlib import Path
 
@@ -93,9 +92,7 @@ def _fly(
     progress: Callable[[int], None],
 ) -> None:
     plant, controller = flight.plant, flight.controller
-    swaps = {tick for tick, _ in flight.swaps if tick < flight.ticks}
-    cuts = {*range(0, flight.ticks, STRETCH_TICKS), *swaps, flight.ticks}
-    for start, stop in itertools.pairwise(sorted(cuts)):
+    for start, stop in flight.stretches(STRETCH_TICKS):
         progress(start)
         if change := choice.change_at(start):
             controller.use(choice.chosen)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
@@ -59,7 +58,7 @@ class FlightBatch:
         """Fly every tick; return the flights as they ended. ``is_brief``: see `empty_log`."""
         ticks = self.flights[0].ticks
         logs = LogsInLanes(self.flights, ticks, is_brief)
-        self._fly(logs, ticks, progress)
+        self._fly(logs, progress)
         flying = self._flying
         flown = [self._flown(k, log) for k, log in enumerate(logs.logs)]
         for k in flying:
@@ -89,10 +88,8 @@ class FlightBatch:
             return unusable(status, reached, plant.state.quaternion)
         return plant.diverged(float(memory.fastest[0, k]))
 
-    def _fly(self, logs: LogsInLanes, ticks: int, progress: Callable[[int], None]) -> None:
-        swaps = {tick for tick, _ in self.flights[0].swaps if tick < ticks}
-        cuts = {*range(0, ticks, STRETCH_TICKS), *swaps, ticks}
-        for start, stop in itertools.pairwise(sorted(cuts)):
+    def _fly(self, logs: LogsInLanes, progress: Callable[[int], None]) -> None:
+        for start, stop in self.flights[0].stretches(STRETCH_TICKS):
             progress(start)
             self._choose_laws(logs, start)
             tick = start
