@@ -13,7 +13,7 @@ from mcap.reader import make_reader
 from mcap.writer import Writer as McapWriter
 from rosbags.rosbag2 import StoragePlugin, Writer
 
-from space_robot.flight.plan import Flight, FlightPlan, resolve
+from space_robot.flight.plan import Flight, Scenario, resolve
 from space_robot.flight.simulate import simulate
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.bag.flight_log import REFERENCE, FlightLog
@@ -95,7 +95,7 @@ def record(
 ) -> Recorded:
     """A flight in a bag whose chunks end at the same ticks as the reference's messages."""
     flown = folder.with_name(folder.name + "_flown")
-    simulate(Flight(resolve(FlightPlan(duration=ticks * TIMEBASE.period))), flown)
+    simulate(Flight(resolve(Scenario(duration=ticks * TIMEBASE.period))), flown)
     recorder, states = BagRecorder(folder, FLIGHT, TIMEBASE, compression), 0
     for topic, data in messages_of(flown):
         if topic is topics.REFERENCE_JOINTS and states and states % ticks_a_chunk == 0:

@@ -57,9 +57,9 @@ def space_robot(
 
 def planned(**options: Any) -> Flight:
     """A flight of `simulate` with some options."""
-    from space_robot.flight.plan import Flight, FlightPlan, resolve
+    from space_robot.flight.plan import Flight, Scenario, resolve
 
-    return Flight(resolve(FlightPlan.model_validate(options)))
+    return Flight(resolve(Scenario.model_validate(options)))
 
 
 def simulated(bag: Path | None = None, **options: Any) -> FlightLog:

@@ -10,7 +10,7 @@ import pytest
 from shown import ROOT
 
 from space_robot.export.software import export
-from space_robot.flight.plan import Flight, FlightPlan, resolve
+from space_robot.flight.plan import Flight, Scenario, resolve
 from space_robot_control.controller import time_delay_estimation
 from space_robot_control.laws import tde_stc
 
@@ -20,7 +20,7 @@ MARK = r"(line )\d+"
 
 @pytest.fixture(scope="module")
 def sources() -> dict[str, str]:
-    exported = export(Flight(resolve(FlightPlan())))
+    exported = export(Flight(resolve(Scenario())))
     return {path.name: text for path, text in exported.sources.items()}
 
 
@@ -48,6 +48,6 @@ def test_listings_and_lines_of_tables_are_those_of_kernel_and_export(
 
 def test_the_low_pass_is_exported_where_it_is_used(sources: dict[str, str]) -> None:
     assert "smooth" not in sources["estimate.c"]
-    plan = FlightPlan(parameters={"controller": {"acceleration_filter_hz": 50.0}})
+    plan = Scenario(parameters={"controller": {"acceleration_filter_hz": 50.0}})
     with_filter = export(Flight(resolve(plan))).sources
     assert any("smooth_force" in text for text in with_filter.values())

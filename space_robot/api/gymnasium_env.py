@@ -19,13 +19,14 @@ from space_robot_msgs_py.config.validation import short
 from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.samples import RobotState
 
+from ..scenario.scenario import Scenario
+
 try:
     import gymnasium
     from gymnasium.spaces import Box
 except ImportError:
     raise ImportError(f"gymnasium is not installed: {install_command('gym')}") from None
 
-from .scenario import Scenario
 
 Array = NDArray[np.float64]
 ScenarioDraw = Callable[[np.random.Generator], Scenario]

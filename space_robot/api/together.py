@@ -15,9 +15,9 @@ from ..flight.batch.compilation import compile_lanes
 from ..flight.batch.sharing import batches
 from ..flight.compilation import compile_kernels
 from ..flight.plan import Flight
+from ..scenario.scenario import Scenario
 from .flown_flight import FlownFlight
 from .in_process import fly_in_process
-from .scenario import Scenario
 
 
 def fly_many(

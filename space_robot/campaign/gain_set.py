@@ -13,7 +13,7 @@ from space_robot_msgs_py.errors import InputError
 from space_robot_sim.environment.environment import with_payload
 
 from ..console.files import make_folder, whole_file
-from ..flight.plan import FlightPlan
+from ..flight.plan import Scenario
 from ..scenario.node_settings import FlightSettings
 from ..scenario.robots import Robots
 from ..tuning.demand import demand
@@ -35,7 +35,7 @@ def tuned_set(
     """Tune a gain set.
 
     Args:
-        options: of a `FlightPlan`: robot (the nominal one), mission, sensors, navigation.
+        options: of a `Scenario`: robot (the nominal one), mission, sensors, navigation.
         cases: names or paths of the environments.
         wishes: the user's tuning options.
         step: called with a description of each step.
@@ -43,8 +43,8 @@ def tuned_set(
     Raises:
         InputError: a named file is missing, or the tuning options contradict each other.
     """
-    plans = [validate(FlightPlan, {**options, "case": case}, "options") for case in cases]
-    settings = [FlightSettings.resolve(plan.options(), plan.parameters) for plan in plans]
+    plans = [validate(Scenario, {**options, "case": case}, "options") for case in cases]
+    settings = [FlightSettings.resolve(plan) for plan in plans]
     nominal, reference = Robots(settings[0], plans[0].robot).plant, settings[0].mission
     motion = sampled_reference(nominal, reference)
     if not (motion.joints[:, 1].any() or motion.base[:, 4:].any()):

@@ -18,10 +18,10 @@ from space_robot_msgs_py.errors import InputError, explained_by
 
 from ..analysis.own_metric import check_names, text_of
 from ..analysis.pointing_budget import PointingBudget
-from ..api.scenario import OF_THE_GRAPH
 from ..scenario.disturbances import as_disturbance
-from ..scenario.options import FlightPlan
+from ..scenario.options import OPTIONS
 from ..scenario.resolve import resolve
+from ..scenario.scenario import Scenario
 
 Design = Literal["independent", "latin_hypercube", "sobol", "saltelli"]
 NOT_TO_BE_EXTENDED = ("latin_hypercube", "saltelli")
@@ -33,7 +33,11 @@ OF_THE_CAMPAIGN = {
     "plant_robot": "vary robot.*",
     "compression": "a campaign's bags use the recorder's default",
     "split_size": "a campaign's bags use the recorder's default",
-    **dict.fromkeys(OF_THE_GRAPH, "only graphs of nodes have it"),
+    **{
+        name: "only graphs of nodes have it"
+        for name, option in OPTIONS.items()
+        if option.needs_graph
+    },
 }
 """Options of a flight that a study cannot set, and the reason or alternative."""
 
@@ -144,7 +148,7 @@ class Study(StrictModel):
         for name in scenario:
             check_option(name)
         if callable(scenario.get("disturbance")):  # numbers can go to any process and file
-            sampled = resolve(FlightPlan(**scenario)).options.disturbance
+            sampled = resolve(Scenario(**scenario)).options.disturbance
             return {**scenario, "disturbance": sampled}
         if "disturbance" in scenario:
             return {**scenario, "disturbance": as_disturbance(scenario["disturbance"])}
@@ -229,7 +233,7 @@ def check_option(name: str) -> None:
     """
     if name in OF_THE_CAMPAIGN:
         raise ValueError(f"{name} cannot be set: {OF_THE_CAMPAIGN[name]}")
-    allowed = [option for option in FlightPlan.model_fields if option not in OF_THE_CAMPAIGN]
+    allowed = [option for option in Scenario.model_fields if option not in OF_THE_CAMPAIGN]
     if name not in allowed:
         raise ValueError(f"unknown option {short(name)}: {choices(name, allowed)}")
 

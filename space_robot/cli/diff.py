@@ -52,10 +52,10 @@ def diff(first: Path, second: Path, as_json: bool) -> None:
 
 def _scenario_of(path: Path) -> dict[str, Any]:
     from ..flight.plan import Flight, resolve
-    from ..scenario.comparison import recorded_scenario, written_options
+    from ..scenario.comparison import read_scenario, recorded_scenario
 
     if path.suffix in (".yaml", ".yml"):
-        return Flight(resolve(written_options(path))).scenario.tree
+        return Flight(resolve(read_scenario(path))).scenario.tree
     return recorded_scenario(path)
 
 

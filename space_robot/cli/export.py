@@ -91,7 +91,7 @@ def export(
     from ..export.software import export as exported_of
     from ..export.verify import verify
     from ..flight.compilation import compile_kernels
-    from ..scenario.options import FlightPlan
+    from ..scenario.scenario import Scenario
     from .export_display import print_export, print_verdicts
 
     check_folder(out, force)
@@ -99,7 +99,7 @@ def export(
     flight.check_in_process()
     exported = exported_of(flight, laws)
     compile_kernels(bool(flight.plant.names.actuators))
-    plan = validate(FlightPlan, options, "options")
+    plan = validate(Scenario, options, "options")
     flights = recorded_flights(plan, exported, laws, acceptance_seconds)
     with counting_progress("recorded flights") as begin:
         advance = begin(len(exported.software.laws) + 2)

@@ -15,7 +15,7 @@ from space_robot_control.laws.base import NO_ESTIMATE, NOMINAL_INERTIA
 from space_robot_msgs_py.config.validation import validate
 from space_robot_msgs_py.errors import FlightError, InputError
 
-from ..flight.plan import Flight, FlightPlan, resolve
+from ..flight.plan import Flight, Scenario, resolve
 from ..flight.simulate import simulate
 from ..scenario.node_settings import FlightSettings
 from ..tuning.flexible import FlexibleMotions, check_flexible
@@ -94,13 +94,13 @@ def checked(options: dict[str, Any], mass_uncertainty: float = 0.2) -> Checked:
     """Check the laws that the options of a command name.
 
     Args:
-        options: of a `FlightPlan`.
+        options: of a `Scenario`.
         mass_uncertainty: share by which masses and inertias may be wrong.
 
     Raises:
         InputError: a name is unknown, or no law can control the base.
     """
-    plan, every = validate(FlightPlan, options, "options"), options["controller"] == ALL
+    plan, every = validate(Scenario, options, "options"), options["controller"] == ALL
     if every:
         plan = plan.model_copy(update={"controller": _first_law(plan)})
     flight = Flight(resolve(plan))
@@ -168,7 +168,7 @@ def with_gears(
     return with_springs, dict(zip(robot.geared_names, extremes, strict=True))
 
 
-def held_ripple(flight: Flight, plan: FlightPlan) -> Array | None:
+def held_ripple(flight: Flight, plan: Scenario) -> Array | None:
     """Return (m,) the RMS of the torque about its mean, N m, with the robot held still.
 
     It is flown for `HELD` s at the start of ``flight``, the last half of which counts.
@@ -185,8 +185,8 @@ def held_ripple(flight: Flight, plan: FlightPlan) -> Array | None:
     return deviation
 
 
-def _first_law(plan: FlightPlan) -> str:
-    settings = FlightSettings.resolve(plan.options(), plan.parameters).controller
+def _first_law(plan: Scenario) -> str:
+    settings = FlightSettings.resolve(plan).controller
     names = available_laws(settings)
     if not names:
         raise InputError(f"gains {settings.gains!r} have no file for any law of this project")

@@ -20,7 +20,8 @@ from space_robot_msgs_py.config.validation import short
 from space_robot_msgs_py.errors import InputError
 
 from ..flight.plan import Flight
-from ..scenario.option_table import OPTIONS
+from ..scenario.objects import NODES
+from ..scenario.options import OPTIONS
 from .options import flight_options, plan_flight
 
 PARAMS_FILE = "params_file"
@@ -51,7 +52,9 @@ class LaunchedFlight(NamedTuple):
 
 
 @click.command()
-@flight_options(*(o.name for o in OPTIONS if o.is_launched), "bag", "set", "scenario")
+@flight_options(
+    *(name for name, option in OPTIONS.items() if option.is_launched), *("bag", "set", "scenario")
+)
 @click.pass_context
 def _plan(
     context: click.Context, /, bag: Path | None, namespace: str, **options: Any
@@ -172,8 +175,6 @@ def _words(option: click.Option, argument: str) -> list[str]:
 def _of_file(file: str) -> tuple[dict[str, dict[str, Any]], dict[str, dict[str, Any]]]:
     """Return the parameters of a ROS parameter file by node: those of the flight, and ROS's own."""
     from space_robot_msgs_py.config.files import flatten, is_of_ros, node_parameters
-
-    from .scenario_option import NODES
 
     parameters = {
         node: dict(flatten(node_parameters(Path(file), node))) if file else {} for node in NODES

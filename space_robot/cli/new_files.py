@@ -214,9 +214,9 @@ def _of_robot(name: str) -> dict[str, str]:
     Raises:
         InputError: the robot cannot be read, or has no mission of its own.
     """
-    from ..flight.plan import FlightPlan, resolve
+    from ..flight.plan import Scenario, resolve
 
-    scenario = resolve(FlightPlan(robot=name))
+    scenario = resolve(Scenario(robot=name))
     robot, start = scenario.robots.plant, scenario.plant.initial_joints_deg
     goal = []
     for joint, position in enumerate(start):
@@ -228,7 +228,7 @@ def _of_robot(name: str) -> dict[str, str]:
     return {
         "robot": name,
         "robot_literal": json.dumps(str(name)),
-        "robot_option": "" if name == FlightPlan().robot else f" --robot {shlex.quote(name)}",
+        "robot_option": "" if name == Scenario().robot else f" --robot {shlex.quote(name)}",
         "start": str(list(start)),
         "goal": str(goal),
     }

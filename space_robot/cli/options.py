@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-import functools
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
+from functools import partial, wraps
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 from click.core import ParameterSource
 
-from ..scenario.option_table import Option, names, option
+from ..scenario.options import OPTIONS
 from .completed_names import names_in
-from .scenario_option import NameOrNumbers, parameters, scenario, scenario_of_flight
 
 if TYPE_CHECKING:
     from ..flight.plan import Flight
@@ -86,7 +85,7 @@ def _list_faults(
 def _robot_options(function: Any) -> Any:
     """Give a command --robot, with --base and --repair, which apply to a URDF."""
 
-    @functools.wraps(function)
+    @wraps(function)
     def with_choice_of_urdf(*args: Any, base: str | None, repair: bool, **options: Any) -> Any:
         if base or repair:
             from space_robot_model.robot.find import with_choice
@@ -94,7 +93,7 @@ def _robot_options(function: Any) -> Any:
             options["robot"] = with_choice(options["robot"], base, repair)
         return function(*args, **options)
 
-    for decorator in (REPAIR, BASE, _click_option(option("robot"))):
+    for decorator in (REPAIR, BASE, _click_option("robot")):
         decorator(with_choice_of_urdf)
     return with_choice_of_urdf
 
@@ -105,41 +104,90 @@ REPAIR = click.option(
 )
 
 
-def _click_option(entry: Option) -> Decorator:
-    """Return a click option made from an option of the table."""
-    dashed = f"--{entry.name.replace('_', '-')}"
-    flag = entry.flag or dashed
-    settings: dict[str, Any] = {"help": entry.help_text, "default": entry.default}
-    if entry.kind == "switch":
-        if entry.default:
-            flag = f"{dashed}/--no-{dashed[2:]}"
-        else:
-            settings["is_flag"] = True
-    elif entry.kind == "texts":
-        settings |= {"multiple": True, "metavar": entry.metavar, "default": None}
-        if entry.choices:
-            settings["type"] = click.Choice(entry.choices)
-    elif entry.choices:
-        settings["type"] = click.Choice(entry.choices)
-    elif entry.kind == "whole number":
-        is_bounded = entry.low is not None and entry.high is not None
-        settings["type"] = (
-            click.IntRange(int(entry.low or 0), int(entry.high or 0)) if is_bounded else int
-        )
-    elif entry.kind == "number":
-        settings["type"] = float
-    elif entry.kind == "name":
+def _click_option(name: str) -> Decorator:
+    option = OPTIONS[name]
+    default, dashed = option.default, f"--{name.replace('_', '-')}"
+    flag = option.flag or dashed
+    settings: dict[str, Any] = {"help": option.help_text, "default": default}
+    if option.choices:
+        settings["type"] = click.Choice(option.choices)
+    elif option.kind is Any:
         settings["type"] = NameOrNumbers()
-    if entry.metavar:
-        settings["metavar"] = entry.metavar
-    if entry.folder:
-        settings["shell_complete"] = names_in(entry.folder, entry.other_names)
-    if entry.default not in (None, "") and entry.kind != "texts":
-        settings["show_default"] = entry.kind != "switch" or bool(entry.default)
-    if entry.name == "faults":
+    elif option.kind is int and option.high is not None:
+        settings["type"] = click.IntRange(int(option.low or 0), int(option.high))
+    elif option.kind is not bool:
+        settings["type"] = option.kind
+    if option.is_list:
+        settings |= {"multiple": True, "default": None}
+    elif option.kind is bool and default:
+        flag = f"{dashed}/--no-{dashed[2:]}"
+    elif option.kind is bool:
+        settings["is_flag"] = True
+    if option.metavar:
+        settings["metavar"] = option.metavar
+    if option.folder:
+        settings["shell_complete"] = names_in(option.folder, option.other_names)
+    if default or (option.kind is int and default is not None):
+        settings["show_default"] = True
+    if name == "faults":
         settings["callback"] = _list_faults
-    return click.option(flag, entry.name, **settings)
+    return click.option(flag, name, **settings)
 
+
+class NameOrNumbers(click.ParamType[Any]):
+    """A name or a path; in a scenario file also a mapping of the numbers."""
+
+    name = "text"
+
+    def convert(
+        self, value: Any, param: click.Parameter | None, context: click.Context | None
+    ) -> Any:
+        """Return the value unchanged."""
+        return value
+
+
+def _use_scenario(
+    context: click.Context,
+    option: click.Parameter,
+    path: Path | None,
+    ignored: Collection[str] = (),
+) -> None:
+    """Use the values of a scenario file as defaults of a command's options."""
+    if path is None:
+        return
+    from space_robot_msgs_py.config.validation import one_of, read_yaml, short, validate
+    from space_robot_msgs_py.errors import InputError
+
+    from ..scenario.scenario import Scenario
+
+    own = {parameter.name for parameter in context.command.params} - {"scenario", "help"}
+    content = {k: v for k, v in read_yaml(path).items() if k in own or k not in ignored}
+    for key, value in content.items():
+        one_of(key, own, "key", f" in {path}")
+        is_text = isinstance(value, (str, int, float)) and "\0" not in str(value)
+        if key not in Scenario.model_fields and not is_text:
+            raise InputError(f"{path}: {key}: a text was expected, got {short(value)}")
+    flown = {key: value for key, value in content.items() if key in Scenario.model_fields}
+    context.meta[_PARAMETERS] = validate(Scenario, flown, str(path)).parameters
+    content.pop("parameters", None)
+    context.default_map = {**(context.default_map or {}), **content}
+
+
+def _parameters(
+    context: click.Context, option: click.Parameter, texts: Any
+) -> dict[str, dict[str, Any]]:
+    """``plant.hold_ticks=40`` to ``{"plant": {"hold_ticks": 40}}``, over the scenario's."""
+    parameters: dict[str, dict[str, Any]] = context.meta.pop(_PARAMETERS, {})
+    if texts:
+        from ..scenario.objects import set_parameter
+
+        for text in texts:
+            set_parameter(parameters, text, "--set")
+    return parameters
+
+
+_PARAMETERS = f"{__name__}.parameters"
+"""Key of a scenario's parameters in the context's ``meta``."""
 
 OTHERS: dict[str, Decorator] = {
     "bag": click.option(
@@ -150,14 +198,14 @@ OTHERS: dict[str, Decorator] = {
         "parameters",
         multiple=True,
         metavar="NODE.PARAM=VALUE",
-        callback=parameters,
+        callback=_parameters,
         help="Any parameter of a node, as plant.hold_ticks=40; may be repeated.",
     ),
     "scenario": click.option(
         "--scenario",
         type=click.Path(path_type=Path),
         is_eager=True,
-        callback=scenario,
+        callback=_use_scenario,
         expose_value=False,
         help="YAML file with any of these options; those given here come first.",
     ),
@@ -165,7 +213,7 @@ OTHERS: dict[str, Decorator] = {
         "--scenario",
         type=click.Path(path_type=Path),
         is_eager=True,
-        callback=scenario_of_flight,
+        callback=partial(_use_scenario, ignored=OPTIONS),
         expose_value=False,
         help="YAML file of a flight's options, of which those of this command count.",
     ),
@@ -173,15 +221,17 @@ OTHERS: dict[str, Decorator] = {
 }
 """Options of flying commands that do not define the flight."""
 _OF_A_FLIGHT = ("bag", "set", "scenario", "json")
-ON_A_FLIGHT = (*names(needs_graph=False), *_OF_A_FLIGHT)
-ON_A_GRAPH = (*names(), *_OF_A_FLIGHT)
+ON_A_GRAPH = (*OPTIONS, *_OF_A_FLIGHT)
+ON_A_FLIGHT = tuple(
+    name for name in ON_A_GRAPH if name in _OF_A_FLIGHT or not OPTIONS[name].needs_graph
+)
 
 
 def flight_option(name: str) -> Decorator:
-    """Return an option of the table, or of `OTHERS`, by its name."""
+    """Return an option of a scenario, or of `OTHERS`, by its name."""
     if name in OTHERS:
         return OTHERS[name]
-    return _robot_options if name == "robot" else _click_option(option(name))
+    return _robot_options if name == "robot" else _click_option(name)
 
 
 def flight_options(*names: str) -> Decorator:
@@ -214,13 +264,13 @@ def resolve_options(**options: Any) -> ResolvedScenario:
     """
     from space_robot_msgs_py.config.validation import validate
 
-    from ..scenario.options import FlightPlan
     from ..scenario.resolve import resolve
+    from ..scenario.scenario import Scenario
 
     context = click.get_current_context(silent=True)
     if context and context.get_parameter_source("controller") is ParameterSource.DEFAULT:
         options.pop("controller", None)  # the robot's own gains may name another
-    return resolve(validate(FlightPlan, options, "options"))
+    return resolve(validate(Scenario, options, "options"))
 
 
 def remarks_on(flight: Flight) -> list[str]:

@@ -9,8 +9,7 @@ import click
 
 from .completed_names import names_in
 from .numbers import FiniteRange
-from .options import file_option, flight_options, resolve_options
-from .scenario_option import NameOrNumbers
+from .options import NameOrNumbers, file_option, flight_options, resolve_options
 
 SECTION = "Robots, missions and own pieces"
 

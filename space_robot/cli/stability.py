@@ -47,11 +47,11 @@ def stability(initial_error: float, as_json: bool, plot: Path | None, **options:
     from ..console.files import make_folder
     from ..console.terminal import echo_json, terminal
     from ..flight.compilation import compile_kernels
-    from ..flight.plan import FlightPlan
+    from ..flight.plan import Scenario
     from ..paper.stability import report, study
     from ..paper.stability.display import print_study
 
-    plan = validate(FlightPlan, options, "options")
+    plan = validate(Scenario, options, "options")
     if plot:
         make_folder(plot)
     compile_kernels()

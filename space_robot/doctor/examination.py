@@ -33,9 +33,9 @@ def check_flights() -> CheckedItem:
     from space_robot_msgs_py.config.text import one_line_of
 
     try:
-        from ..flight.plan import FlightPlan, resolve
+        from ..flight.plan import Scenario, resolve
 
-        plan = resolve(FlightPlan()).options
+        plan = resolve(Scenario()).options
     except Exception as error:  # whatever fails here would end a flight
         text = f"no flight can be prepared ({one_line_of(error)})"
         advice = "reinstall space_robot, with the versions of constraints.txt"

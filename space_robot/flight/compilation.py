@@ -27,7 +27,7 @@ from space_robot_msgs_py.wire.codecs import CommandCodec, StateCodec, read, writ
 from ..processes.child_process import child_process
 from ..processes.interruption import not_lost_in_callbacks
 from .closed_loop import fly_ticks
-from .plan import Flight, FlightPlan, resolve
+from .plan import Flight, Scenario, resolve
 
 _config: Any = numba.config
 MARK, ALLOCATION_MARK = "complete", "allocation"
@@ -66,11 +66,11 @@ def _compile_flights() -> None:
     own = [law.kernel for law in laws_with_gains().values() if issubclass(law, CompiledLaw)]
     with compiling("the dynamics and the laws", fly_ticks, read, write, *own):
         with child_process(module_command(__name__), stdout=subprocess.DEVNULL) as helper:
-            _step_plant(Flight(resolve(FlightPlan())))
+            _step_plant(Flight(resolve(Scenario())))
             helper.wait()
         for law in laws_with_gains():
-            simulate(Flight(resolve(FlightPlan(controller=law, duration=0.002))))
-        _step_plant(Flight(resolve(FlightPlan())))
+            simulate(Flight(resolve(Scenario(controller=law, duration=0.002))))
+        _step_plant(Flight(resolve(Scenario())))
         _answer_under_every_law()
     mark.touch()
 
@@ -102,7 +102,7 @@ def compiling(what: str, *kernels: Any, again: bool = False) -> Iterator[None]:
 def load_kernels() -> None:
     """Load the kernels used by nodes from the cache, if it exists."""
     if mark_of(MARK).exists():
-        flight = Flight(resolve(FlightPlan()))
+        flight = Flight(resolve(Scenario()))
         _step_plant(flight)
         _answer_and_exchange(flight)
 
@@ -128,7 +128,7 @@ def _answer_and_exchange(flight: Flight) -> None:
 
 def _answer_under_every_law() -> None:
     for law in laws_with_gains():
-        _answer_and_exchange(Flight(resolve(FlightPlan(controller=law, navigation="filtered"))))
+        _answer_and_exchange(Flight(resolve(Scenario(controller=law, navigation="filtered"))))
 
 
 if __name__ == "__main__":

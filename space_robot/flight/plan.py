@@ -16,13 +16,13 @@ from space_robot_sim.plant.plant import Plant
 from space_robot_sim.plant.report import plant_description
 
 from ..processes.software import commit, versions
-from ..scenario.options import NO_FRICTION, FlightPlan
 from ..scenario.resolve import resolve
 from ..scenario.resolved import ResolvedScenario
+from ..scenario.scenario import NO_FRICTION, Scenario
 from .mission_demand import check_mission_demand, held_base_remark
 from .start_step import sentence, start_step
 
-__all__ = ["NO_FRICTION", "Flight", "FlightPlan", "resolve"]
+__all__ = ["NO_FRICTION", "Flight", "Scenario", "resolve"]
 
 
 class Flight:
@@ -95,19 +95,13 @@ class Flight:
         Raises:
             InputError: an option needs a graph of nodes.
         """
-        if self.scenario.process_faults:
-            asked = f"faults {[str(fault) for fault in self.scenario.process_faults]}"
-        elif self.scenario.options.without:
-            asked = "without"
-        elif self.plant_settings.realtime:
-            asked = "realtime"
-        elif self.plant_settings.paused:
-            asked = "paused"
-        elif self.plant_settings.fifo_priority or self.controller_settings.fifo_priority:
-            asked = "fifo_priority"
-        else:
-            return
-        raise InputError(f"{asked}: that needs the graph of nodes: use `fly`")
+        plant, faults = self.plant_settings, self.scenario.process_faults
+        asked = [f"faults {[str(fault) for fault in faults]}"] if faults else []
+        asked += self.scenario.options.graph_options
+        asked += [name for name in ("realtime", "paused", "fifo_priority") if getattr(plant, name)]
+        asked += ["fifo_priority"] if self.controller_settings.fifo_priority else []
+        if asked:
+            raise InputError(f"{asked[0]}: that needs the graph of nodes: use `fly`")
 
     @cached_property
     def start_step(self) -> dict[str, Any] | None:

@@ -16,9 +16,9 @@ from space_robot_msgs_py.errors import InputError
 from space_robot_sim.plant.plant import Plant
 from space_robot_sim.plant.tick import update_true_state
 
-from ..api.scenario import Scenario
 from ..flight.compilation import compile_kernels
 from ..flight.plan import Flight
+from ..scenario.scenario import Scenario
 
 Array = NDArray[np.float64]
 

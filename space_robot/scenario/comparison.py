@@ -8,11 +8,10 @@ from typing import Any, NamedTuple
 
 from space_robot_msgs_py.bag.description import read_description
 from space_robot_msgs_py.bag.folder import open_bag
-from space_robot_msgs_py.config.files import flatten, nest
 from space_robot_msgs_py.config.validation import read_yaml, validate
 from space_robot_msgs_py.errors import InputError
 
-from .options import FlightPlan
+from .scenario import Scenario
 
 
 class ChangedNumber(NamedTuple):
@@ -40,19 +39,13 @@ def recorded_scenario(bag: Path) -> dict[str, Any]:
     return {**numbers, **robots}
 
 
-def written_options(file: Path) -> FlightPlan:
-    """Return the options in a scenario file.
+def read_scenario(file: Path) -> Scenario:
+    """Return the scenario in a file.
 
     Raises:
         InputError: If the file cannot be read, or an option in it is wrong.
     """
-    content = read_yaml(file)
-    if isinstance(parameters := content.get("parameters"), Mapping):
-        content["parameters"] = {
-            str(node): dict(flatten(nest(values))) if isinstance(values, Mapping) else values
-            for node, values in parameters.items()
-        }
-    return validate(FlightPlan, content, str(file))
+    return validate(Scenario, read_yaml(file), str(file))
 
 
 def differences(first: Mapping[str, Any], second: Mapping[str, Any]) -> list[ChangedNumber]:

@@ -4,16 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from contextlib import suppress
+from inspect import isclass
 from typing import Any, NamedTuple
 
 from pydantic import ValidationError
 
 from space_robot_control.controller.gains import split_gains
-from space_robot_control.controller.settings import ControllerNodeSettings, gains_as_path
-from space_robot_control.guidance.mission import MissionNodeSettings, pointing_start
-from space_robot_control.laws import ControlLaw
+from space_robot_control.controller.settings import DEFAULT, ControllerNodeSettings, gains_as_path
+from space_robot_control.guidance.mission import (
+    MissionNodeSettings,
+    MissionSettings,
+    pointing_start,
+)
+from space_robot_control.laws import ControlLaw, find_law, importable_name, laws
 from space_robot_control.navigation.settings import assumed_numbers
 from space_robot_model.orbit.ephemeris import AssumedOrbit, AssumedTarget
+from space_robot_model.robot.mission_document import OF_PLANT, document_settings
 from space_robot_msgs_py.bag.recorder import RecorderNodeSettings
 from space_robot_msgs_py.config.files import GIVEN, Tree, flatten, merge, nest
 from space_robot_msgs_py.config.settings import NodeSettings
@@ -21,7 +27,12 @@ from space_robot_msgs_py.config.validation import one_of, validate
 from space_robot_msgs_py.errors import InputError, explained_by
 from space_robot_sim.environment.events import Capture
 from space_robot_sim.environment.neighbouring_orbit import target_state
-from space_robot_sim.plant.settings import PlantNodeSettings
+from space_robot_sim.plant.settings import PLANT_KINDS, PlantNodeSettings
+
+from .disturbances import table_parameters
+from .objects import AnyLaw, resolve_law, robot_setting
+from .options import OPTIONS
+from .scenario import NO_FRICTION, Scenario
 
 SCHEMAS: tuple[type[NodeSettings], ...] = (
     PlantNodeSettings,
@@ -53,9 +64,6 @@ NOT_TO_BE_SET = {
 OPTIONS_OF_NODES = ("period", "paused")
 """Those among them that options of a flight set."""
 
-Given = Mapping[str, Mapping[str, Any]]
-"""Parameters by node and dotted name."""
-
 
 class FlightSettings(NamedTuple):
     """Settings of every node, and gains given directly by the user."""
@@ -68,16 +76,14 @@ class FlightSettings(NamedTuple):
     """Gains by law, which override the gain set."""
 
     @classmethod
-    def resolve(cls, options: Given, parameters: Given) -> FlightSettings:
+    def resolve(cls, scenario: Scenario) -> FlightSettings:
         """Resolve settings: options override files, single parameters override both.
 
         Raises:
             InputError: a parameter is invalid or cannot be set this way.
         """
-        check_may_be_set(parameters)
-        chosen = {
-            node: nest({**options.get(node, {}), **parameters.get(node, {})}) for node in NODES
-        }
+        _check_may_be_set(scenario.parameters)
+        chosen = {node: nest(values) for node, values in option_parameters(scenario).items()}
         plant = PlantNodeSettings.resolve(chosen["plant"])
         if events := [str(event) for event in plant.parsed_events]:  # with the targets' numbers
             plant = plant.model_copy(update={"events": events})
@@ -183,14 +189,98 @@ def _at_pointing_start(plant: PlantNodeSettings, mission: MissionNodeSettings) -
     )
 
 
-def check_may_be_set(parameters: Given) -> None:
-    """Check that the nodes exist and that no parameter is set by the flight itself.
-
-    Raises:
-        InputError: a parameter cannot be set; the message names the alternative.
-    """
+def _check_may_be_set(parameters: Mapping[str, Mapping[str, Any]]) -> None:
+    """Check that the nodes exist and that no parameter is set by the flight itself."""
     for node, values in parameters.items():
         one_of(node, NODES, "node", " in parameters")
         for name, _ in flatten(nest(values)):
             if why := NOT_TO_BE_SET.get(f"{node}.{name}"):
                 raise InputError(f"{node}.{name} cannot be set: {why}")
+
+
+def option_parameters(scenario: Scenario) -> dict[str, dict[str, Any]]:
+    """Return the parameters that a scenario sets, by node and dotted name."""
+
+    def changed(*options: str) -> Tree:  # the others are as a node's files say
+        values = {option: getattr(scenario, option) for option in options}
+        return {name: value for name, value in values.items() if value != OPTIONS[name].default}
+
+    robot, law = robot_setting(scenario.robot), resolve_law(scenario.controller)
+    mission, waypoints, start = _mission(scenario.mission)
+    gains, gain_values = _gains(scenario.gains, law)
+    files: Tree = {"robot": robot, "mission": mission}
+    numbers: Tree = {}
+    for option in ("case", "orbit", "sensors", "actuators"):
+        value = getattr(scenario, option)
+        files[option] = value if isinstance(value, str) else GIVEN
+        numbers |= {} if isinstance(value, str) else value
+    if scenario.orbit == OPTIONS["orbit"].default:
+        del files["orbit"]
+    parameters: dict[str, Tree] = {
+        "plant": {
+            **changed("substeps"),
+            **files,
+            **start,
+            **numbers,
+            **table_parameters(scenario.disturbance),
+            "realtime": scenario.realtime,
+            "command_latency_ticks": scenario.command_latency_ticks,
+            "fifo_priority": scenario.fifo_priority,
+            "faults": scenario.faults_of(PLANT_KINDS),
+            "fault_seed": scenario.seed,
+            **changed("paused", "events"),
+            **({} if scenario.friction else NO_FRICTION),
+        },
+        "controller": {
+            "robot": robot,
+            **({"controller": _law_parameter(law)} if scenario.has_chosen_law else {}),
+            "gains": gains,
+            **gain_values,
+            "fifo_priority": scenario.fifo_priority,
+            "swaps": scenario.swaps,
+            **changed("controller_code", "shadow", "navigation"),
+        },
+        "mission": {"robot": robot, "mission": mission, **waypoints},
+        "recorder": changed("compression", "split_size"),
+    }
+    return {
+        node: {**changed("period"), **values, **scenario.parameters.get(node, {})}
+        for node, values in parameters.items()
+    }
+
+
+def _law_parameter(law: str | AnyLaw | None) -> str:
+    """Return what the parameter ``controller`` says; `importable_name` of a law not shipped."""
+    if law is None or isinstance(law, str):
+        return law or ""
+    kind = law if isclass(law) else type(law)
+    return kind.name if laws().get(kind.name) is kind else importable_name(kind)
+
+
+def _mission(mission: str | Tree) -> tuple[str, Tree, Tree]:
+    """Return the file's name, and the settings for mission and plant.
+
+    Unless it is given too, the plant begins at the mission's start.
+    """
+    if isinstance(mission, str):
+        return mission, {}, {}
+    if "start" in mission:
+        mission = document_settings(mission, "mission")
+    waypoints = {key: value for key, value in mission.items() if key not in OF_PLANT}
+    settings = validate(MissionSettings, waypoints, "mission")
+    start: Tree = {"initial_joints_deg": settings.joints_deg}
+    if not settings.base_point.strip():
+        start["initial_quaternion"] = settings.base_quaternion
+    if any(settings.base_rate_deg_s):
+        start["initial_rate_deg_s"] = settings.base_rate_deg_s
+    return GIVEN, waypoints, start | {key: mission[key] for key in OF_PLANT if key in mission}
+
+
+def _gains(gains: str | Tree, law: str | AnyLaw | None) -> tuple[str, Tree]:
+    """Return the name of the set, and the gains that override it as ``<law>.<gain>``."""
+    if isinstance(gains, str):
+        return gains, {}
+    if not any(isinstance(value, dict) for value in gains.values()):
+        flown = find_law(law) if isinstance(law, str) else law
+        gains = {flown.name: gains} if flown is not None else {}
+    return DEFAULT, gains

@@ -1,7 +1,6 @@
-"""Objects and numbers as values of flight options: robot, law, gains, settings.
+"""Objects and numbers as values of a scenario: what each option accepts beside a name.
 
-An option's value is kept as it was given; the functions here turn it into what the nodes'
-parameters are to be. Numbers that are given stand over no file: its name is `GIVEN` then.
+Values are kept as they are given; numbers that are given stand over no file: its name is `GIVEN`.
 """
 
 from __future__ import annotations
@@ -9,27 +8,38 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from inspect import isabstract, isclass
 from pathlib import PurePath
-from typing import Annotated, Any
+from typing import Any
 
 import numpy as np
-from pydantic import BaseModel, BeforeValidator, PlainValidator
+from pydantic import BaseModel, ByteSize, TypeAdapter, ValidationError
 
 from space_robot_control.controller.law_choice import law_of
 from space_robot_control.guidance.mission import MissionSettings
-from space_robot_control.laws import ControlLaw, find_law, importable_name, laws
+from space_robot_control.laws import ControlLaw
 from space_robot_model.hardware.base_actuators import BaseActuatorSettings
 from space_robot_model.hardware.sensors import SensorSettings
 from space_robot_model.robot import Robot
 from space_robot_model.robot.find import ROBOTS, robot_as_path
 from space_robot_model.robot.mission_document import OF_PLANT, document_settings
-from space_robot_msgs_py.config.files import GIVEN, Tree, is_named, nest
-from space_robot_msgs_py.config.validation import StrictModel, validate
+from space_robot_msgs_py.config.files import GIVEN, Tree, flatten, is_named, nest
+from space_robot_msgs_py.config.validation import (
+    StrictModel,
+    full_namespace,
+    one_of,
+    short,
+    validate,
+)
+from space_robot_msgs_py.config.yaml_text import YamlTextError, parse_yaml
+from space_robot_msgs_py.errors import InputError
 from space_robot_sim.actuators.actuators import ActuatorSettings
 from space_robot_sim.environment.environment import EnvironmentSettings
 from space_robot_sim.environment.events import Capture, Release
 from space_robot_sim.environment.orbit import OrbitSettings
 
 from .disturbances import as_disturbance
+
+NODES = ("plant", "controller", "mission", "recorder")
+AnyLaw = type[ControlLaw] | ControlLaw
 
 
 def _name(value: Any, otherwise: str) -> str:
@@ -89,11 +99,9 @@ def _robot(value: Any) -> str | Robot | Tree:
 
 
 def _law(value: Any) -> Any:
-    if value is None or isinstance(value, ControlLaw):
-        return value
     if isclass(value) and issubclass(value, ControlLaw) and not isabstract(value):
         return value
-    if callable(value) and not isclass(value):
+    if value is None or isinstance(value, ControlLaw) or (callable(value) and not isclass(value)):
         return value
     return _name(value, "a ControlLaw (class or object), or a function")
 
@@ -104,29 +112,67 @@ def _gains(value: Any) -> str | Tree:
     return _listed(nest(_plain(value)))
 
 
-def _listed(gains: Tree) -> Tree:
+def _listed(gains: Any) -> Any:
     """Convert a number to a list of one, which applies to all axes."""
-    return {
-        name: _listed(value)
-        if isinstance(value, dict)
-        else value
-        if isinstance(value, list)
-        else [value]
-        for name, value in gains.items()
-    }
+    if isinstance(gains, dict):
+        return {name: _listed(value) for name, value in gains.items()}
+    return gains if isinstance(gains, list) else [gains]
 
 
-RobotGiven = Annotated[Any, PlainValidator(_robot)]
-LawGiven = Annotated[Any, PlainValidator(_law)]
-Gains = Annotated[Any, PlainValidator(_gains)]
-MissionGiven = Annotated[Any, PlainValidator(_mission)]
-Case = Annotated[Any, PlainValidator(_settings(EnvironmentSettings))]
-Sensors = Annotated[Any, PlainValidator(_settings(SensorSettings))]
-Actuators = Annotated[Any, PlainValidator(_settings(ActuatorSettings))]
-DisturbanceGiven = Annotated[Any, PlainValidator(as_disturbance)]
-OrbitGiven = Annotated[Any, PlainValidator(_settings(OrbitSettings))]
-AssumedActuators = Annotated[Any, PlainValidator(_settings(BaseActuatorSettings))]
-EventText = Annotated[str, BeforeValidator(_plain)]
+def _size(value: Any) -> int:
+    try:
+        return int(TypeAdapter(ByteSize).validate_python(value))
+    except ValidationError as error:
+        raise ValueError(error.errors()[0]["msg"]) from None
+
+
+def _parameters(value: Any) -> dict[str, Tree]:
+    """Accept parameters by node and name, as nested mappings too, or texts as of ``--set``."""
+    parameters: dict[str, Tree] = {}
+    if isinstance(value, list) and all(isinstance(text, str) for text in value):
+        for text in value:
+            set_parameter(parameters, text, "parameters")
+    elif isinstance(value, Mapping) and all(isinstance(own, Mapping) for own in value.values()):
+        parameters = {str(node): dict(flatten(own)) for node, own in value.items()}
+    else:
+        raise ValueError("a mapping of nodes to their parameters was expected")
+    return parameters
+
+
+def set_parameter(parameters: dict[str, Tree], text: str, where: str) -> None:
+    """Put ``plant.hold_ticks=40`` into parameters by node and dotted name."""
+    name, equals, value = text.partition("=")
+    node, _, parameter = name.partition(".")
+    if not (equals and parameter):
+        raise InputError(
+            f"{where} {short(text)}: NODE.PARAM=VALUE expected, as in plant.hold_ticks=40"
+        )
+    one_of(node, NODES, "node", f" in {where} {short(text)}")
+    try:
+        parsed = parse_yaml(value)
+    except YamlTextError as error:
+        raise InputError(f"{where} {short(name)}: {error}") from None
+    parameters.setdefault(node, {}).update(flatten({parameter: parsed}))
+
+
+CONVERTERS: Mapping[str, Callable[[Any], Any]] = {
+    "robot": _robot,
+    "plant_robot": _robot,
+    "controller": _law,
+    "gains": _gains,
+    "mission": _mission,
+    "case": _settings(EnvironmentSettings),
+    "sensors": _settings(SensorSettings),
+    "actuators": _settings(ActuatorSettings),
+    "assumed_actuators": _settings(BaseActuatorSettings),
+    "orbit": _settings(OrbitSettings),
+    "disturbance": as_disturbance,
+    "events": _plain,
+    "namespace": lambda value: full_namespace(value) if isinstance(value, str) else value,
+    "split_size": _size,
+    "parameters": _parameters,
+}
+"""What converts or refuses a value of a field."""
 
 
 def robot_setting(robot: str | Robot | Tree) -> str:
@@ -142,57 +188,7 @@ def robot_setting(robot: str | Robot | Tree) -> str:
     return robot.name if is_named(ROBOTS, robot.name) else GIVEN
 
 
-def resolve_law(law: Any) -> str | type[ControlLaw] | ControlLaw | None:
+def resolve_law(law: Any) -> str | AnyLaw | None:
     """Return a law unchanged, or a function wrapped as a law."""
     is_function = callable(law) and not isclass(law) and not isinstance(law, ControlLaw)
     return law_of(law) if is_function else law
-
-
-def law_parameter(law: str | type[ControlLaw] | ControlLaw | None) -> str:
-    """Return what the parameter ``controller`` says; `importable_name` of a law not shipped."""
-    if law is None:
-        return ""
-    if isinstance(law, str):
-        return law
-    kind = law if isclass(law) else type(law)
-    return kind.name if laws().get(kind.name) is kind else importable_name(kind)
-
-
-def numbers_of(value: str | Tree) -> tuple[str, Tree]:
-    """Return the name of the file and the numbers that override it."""
-    return (value, {}) if isinstance(value, str) else (GIVEN, value)
-
-
-def mission_of(mission: str | Tree) -> tuple[str, Tree, Tree]:
-    """Return the file's name, and the settings for mission and plant.
-
-    Unless it is given too, the plant begins at the mission's start.
-    """
-    if isinstance(mission, str):
-        return mission, {}, {}
-    if "start" in mission:
-        mission = document_settings(mission, "mission")
-    of_mission = {key: v for key, v in mission.items() if key not in OF_PLANT}
-    settings = validate(MissionSettings, of_mission, "mission")
-    start: Tree = {"initial_joints_deg": settings.joints_deg}
-    if not settings.base_point.strip():
-        start["initial_quaternion"] = settings.base_quaternion
-    if any(settings.base_rate_deg_s):
-        start["initial_rate_deg_s"] = settings.base_rate_deg_s
-    return GIVEN, of_mission, start | {key: mission[key] for key in OF_PLANT if key in mission}
-
-
-def gains_of(
-    gains: str | Tree, law: str | type[ControlLaw] | ControlLaw | None
-) -> tuple[str, Tree]:
-    """Return the name of the set, and the gains that override it as ``<law>.<gain>``.
-
-    Raises:
-        InputError: the law does not exist.
-    """
-    if isinstance(gains, str):
-        return gains, {}
-    if not any(isinstance(value, dict) for value in gains.values()):
-        of_law = find_law(law) if isinstance(law, str) else law
-        gains = {of_law.name: gains} if of_law is not None else {}
-    return "default", gains

@@ -1,177 +1,240 @@
-"""Options of a flight, as names, paths or objects."""
+"""The options of a flight, each declared once as a field.
+
+The command line, launch arguments, scenario files and the reference are made from these fields;
+`space_robot.scenario.scenario.Scenario` has them and validates their values. Nothing heavy is
+imported, not even Pydantic, so that ``--help`` is quick.
+"""
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal
+from dataclasses import dataclass, replace
+from typing import Annotated, Any, Literal, get_args, get_origin, get_type_hints
 
-from pydantic import AfterValidator, ByteSize, Field
-
-from space_robot_control.navigation.settings import NavigationMode
-from space_robot_msgs_py.bag.writer import Compression
-from space_robot_msgs_py.config.validation import StrictModel, full_namespace
-from space_robot_msgs_py.errors import explained_by
-from space_robot_sim.faults.grammar import Kinds, parse_faults
-from space_robot_sim.plant.settings import PLANT_KINDS
-
-from .disturbances import table_parameters
-from .faults import KINDS
-from .objects import (
-    Actuators,
-    AssumedActuators,
-    Case,
-    DisturbanceGiven,
-    EventText,
-    Gains,
-    LawGiven,
-    MissionGiven,
-    OrbitGiven,
-    RobotGiven,
-    Sensors,
-    gains_of,
-    law_parameter,
-    mission_of,
-    numbers_of,
-    resolve_law,
-    robot_setting,
-)
-from .option_table import option
-
-NO_FRICTION = {"friction.coulomb": 0.0, "friction.viscous": 0.0}
+from annotated_types import Ge, Gt, Le
 
 
-def of(name: str) -> Any:
-    """Return the pydantic field of an option of the table."""
-    entry = option(name)
-    if entry.kind == "texts":
-        return Field(default_factory=list, description=entry.help_text)
-    return Field(**entry.field)
+@dataclass(frozen=True)
+class Option:
+    """A field of `Options`, and what a user reads and writes of it."""
 
-
-class FlightPlan(StrictModel):
-    """The options of ``fly`` and ``simulate``."""
-
-    controller: LawGiven = of("controller")
-    """Unless it is set, that of the gain set's ``controller.yaml``, if there is one. Also a
-    `ControlLaw` class or object; a function, see
-    `space_robot_control.controller.law_choice`; None: none, on the bench."""
-    case: Case = of("case")
-    disturbance: DisturbanceGiven = of("disturbance")
-    """A table's file; also its columns, numbers by name, or a function of time that is sampled at
-    100 Hz, see `space_robot.scenario.disturbances.sampled`."""
-    gains: Gains = of("gains")
-    """Also numbers by gain (or by law, then gain), over the default set."""
-    sensors: Sensors = of("sensors")
-    actuators: Actuators = of("actuators")
-    """Actuators of the base."""
-    orbit: OrbitGiven = of("orbit")
-    assumed_actuators: AssumedActuators | None = of("assumed_actuators")
-    """Actuators that the flight software assumes (None: as in their file)."""
-    robot: RobotGiven = of("robot")
-    plant_robot: RobotGiven | None = of("plant_robot")
-    """True robot of the plant; controller and mission know ``robot`` (None: the same)."""
-    mission: MissionGiven = of("mission")
-    duration: float | None = of("duration")
-    period: float | None = of("period")
-    substeps: int | None = of("substeps")
-    navigation: NavigationMode | None = of("navigation")
-    command_latency_ticks: int = of("command_latency_ticks")
-    friction: bool = of("friction")
-    realtime: bool = of("realtime")
-    paused: bool = of("paused")
-    fifo_priority: int = of("fifo_priority")
-    faults: list[str] = of("faults")
-    events: list[EventText] = of("events")
-    seed: int = of("seed")
-    swaps: list[str] = of("swaps")
-    controller_code: str = of("controller_code")
-    shadow: Literal["none", "c"] = of("shadow")
-    restart_controller: bool = of("restart_controller")
-    without: list[Literal["controller", "mission"]] = of("without")
-    """Nodes that are not started: others' take their places."""
-    join_timeout: float = of("join_timeout")
-    composed: bool = of("composed")
-    domain: int | None = of("domain")
-    namespace: Annotated[str, AfterValidator(full_namespace)] = of("namespace")
-    compression: Compression | None = of("compression")
-    split_size: ByteSize | None = of("split_size")
-    parameters: dict[str, dict[str, Any]] = Field(default_factory=dict)
-    """Further parameters by node, dotted names."""
+    help: str
+    """``{names}`` stands for the names of the files in `folder`."""
+    default: Any
+    default_text: str = ""
+    """Text shown for a default of None or ""; empty: the default itself is shown."""
+    low: float | None = None
+    high: float | None = None
+    above: float | None = None
+    flag: str = ""
+    """On the command line (empty: --name)."""
+    metavar: str = ""
+    folder: str = ""
+    """Folder of config/ with the files, or folders, that can be named."""
+    other_names: tuple[str, ...] = ()
+    """Names without a file there."""
+    needs_graph: bool = False
+    """True if the option applies only to a graph of nodes."""
+    is_launched: bool = True
+    """True if the option is also an argument of the launch file."""
+    kind: Any = Any
+    """Type of the field, from its annotation, without None; of a list, that of its items."""
+    is_list: bool = False
+    choices: tuple[str, ...] = ()
 
     @property
-    def has_chosen_law(self) -> bool:
-        """Whether the user set the law."""
-        own = self.parameters.get("controller", {})
-        return "controller" in self.model_fields_set or "controller" in own
+    def help_text(self) -> str:
+        """Return the help with the names of the files and the default."""
+        from space_robot_msgs_py.config.installation import config_directory
 
-    @explained_by("disturbances")
-    def faults_of(self, kinds: Kinds) -> list[str]:
-        """Return the texts of the faults of the given ``kinds``.
+        text = self.help
+        if "{names}" in text:
+            files = sorted((config_directory() / self.folder).glob("*.yaml"))
+            text = text.replace("{names}", ", ".join(file.stem for file in files))
+        return f"{text} [default: {self.default_text}]." if self.default_text else f"{text}."
 
-        Raises:
-            InputError: a fault is invalid.
-        """
-        return [str(f) for f in parse_faults(self.faults, KINDS) if f.kind.name in kinds]
+    def with_type(self, hint: Any) -> Option:
+        """Return the option of a field with this annotation."""
+        kinds = [kind for kind in get_args(hint) if kind is not type(None)]
+        kind = hint if get_origin(hint) is Literal or not kinds else kinds[0]
+        choices = get_args(kind) if get_origin(kind) is Literal else ()
+        return replace(self, kind=kind, is_list=get_origin(hint) is list, choices=choices)
 
-    def options(self) -> dict[str, dict[str, Any]]:
-        """Return the parameters of each node set by the options, by dotted name."""
-        robot = robot_setting(self.robot)
-        mission, waypoints, start = mission_of(self.mission)
-        (case, world), (sensors, errors), (actuators, hardware), (orbit, place) = (
-            numbers_of(value) for value in (self.case, self.sensors, self.actuators, self.orbit)
-        )
-        law = resolve_law(self.controller)
-        gains, values = gains_of(self.gains, law)
-        period = {} if self.period is None else {"period": self.period}
-        return {
-            "plant": {
-                **period,
-                **({} if self.substeps is None else {"substeps": self.substeps}),
-                "robot": robot,
-                "mission": mission,
-                "case": case,
-                "sensors": sensors,
-                "actuators": actuators,
-                **({} if orbit == "none" else {"orbit": orbit}),
-                **start,
-                **world,
-                **table_parameters(self.disturbance),
-                **place,
-                **errors,
-                **hardware,
-                "realtime": self.realtime,
-                **({"paused": True} if self.paused else {}),
-                "command_latency_ticks": self.command_latency_ticks,
-                "fifo_priority": self.fifo_priority,
-                "faults": self.faults_of(PLANT_KINDS),
-                "fault_seed": self.seed,
-                **({"events": self.events} if self.events else {}),
-                **({} if self.friction else NO_FRICTION),
-            },
-            "controller": {
-                **period,
-                "robot": robot,
-                **({"controller": law_parameter(law)} if self.has_chosen_law else {}),
-                "gains": gains,
-                **values,
-                "fifo_priority": self.fifo_priority,
-                "swaps": self.swaps,
-                **(
-                    {}
-                    if self.controller_code == "python"
-                    else {"controller_code": self.controller_code}
-                ),
-                **({} if self.shadow == "none" else {"shadow": self.shadow}),
-                **({} if self.navigation is None else {"navigation": self.navigation}),
-            },
-            "mission": {**period, "robot": robot, "mission": mission, **waypoints},
-            "recorder": {
-                **period,
-                **({} if self.compression is None else {"compression": self.compression}),
-                **({} if self.split_size is None else {"split_size": int(self.split_size)}),
-            },
-        }
 
-    def with_parameters(self, node: str, values: dict[str, Any]) -> FlightPlan:
-        """Return the same plan with further parameters of a node, by dotted name."""
-        parameters = {**self.parameters, node: {**self.parameters.get(node, {}), **values}}
-        return self.model_copy(update={"parameters": parameters})
+option: Any = Option  # a field has the type of its value, not this one
+
+
+class Options:
+    """Fields of a scenario; one of type Any is a name, a path or an object."""
+
+    """Fields of a scenario; a field of type Any is a name, a path or an object."""
+
+    controller: Any = option(
+        "Law: {names}, or file.py:Class of your own", "tde_stc", folder="gains/paper/tuned"
+    )
+    """Unless it is set, that of the gain set's ``controller.yaml``, if there is one."""
+    case: Any = option("Friction, disturbance and payload: {names}, or a path", "1", folder="cases")
+    disturbance: Any = option(
+        "Your own disturbance, unknown to the law: a CSV or Parquet file with columns time, "
+        "base_force_x..z, base_torque_x..z (base frame) and joints by name, SI units",
+        "",
+        default_text="none",
+        metavar="FILE",
+    )
+    sensors: Any = option("Sensors: {names}, or a path to a YAML file", "ideal", folder="sensors")
+    actuators: Any = option(
+        "Actuators of the base: {names} (none: it floats freely), or a path to a YAML file",
+        "ideal",
+        folder="actuators",
+    )
+    assumed_actuators: Any = option(
+        "Actuators of the base as the flight software assumes them",
+        None,
+        default_text="as they are",
+        folder="actuators",
+    )
+    orbit: Any = option(
+        "Orbit, with gravity gradient, drag, sunlight and magnetic field: {names}, or a path to "
+        "a YAML file",
+        "none",
+        folder="orbits",
+    )
+    gains: Any = option(
+        "Gain set: printed, tuned, robust, default (printed where it flies), or a path",
+        "default",
+        folder="gains/paper",
+        other_names=("default",),
+    )
+    robot: Any = option(
+        "Robot: {names}, or a path to its YAML, URDF or folder", "paper", folder="robots"
+    )
+    plant_robot: Any = option(
+        "Robot that flies, unknown to the laws and the mission",
+        None,
+        default_text="the same robot",
+        folder="robots",
+    )
+    mission: Any = option(
+        "Mission by name or path", "", default_text="the robot's", folder="missions"
+    )
+    duration: float | None = option(
+        "Seconds to fly", None, default_text="the mission's", above=0.0, high=1e6
+    )
+    period: float | None = option("Length of a tick of all nodes, s", None, default_text="0.0005")
+    substeps: int | None = option(
+        "Integration steps of the plant in a tick", None, default_text="1"
+    )
+    compression: Literal["none", "lz4", "zstd"] | None = option(
+        "Compression of the bag", None, default_text="lz4"
+    )
+    split_size: str | int | None = option(
+        "Continue the bag in another file after this many bytes, as 500K, 100M, 2G",
+        None,
+        default_text="one file",
+        metavar="SIZE",
+    )
+    navigation: Literal["direct", "filtered"] | None = option(
+        "What the laws see: the measurements, or the navigation filter's estimates",
+        None,
+        default_text="direct",
+    )
+    command_latency_ticks: int = option("Ticks by which the plant applies commands late", 0)
+    friction: bool = option("Joint friction of the case, or none", True)
+    swaps: list[str] = option(
+        "Swap to LAW at T simulated seconds; may be repeated", [], flag="--swap", metavar="T:LAW"
+    )
+    faults: list[str] = option(
+        "Inject a fault at T simulated seconds; may be repeated; --fault list lists all kinds",
+        [],
+        flag="--fault",
+        metavar="KIND@T[-END][:ARG]",
+    )
+    events: list[str] = option(
+        "Capture a target (of config/targets, or a path to its YAML) or release it at T "
+        "simulated seconds; may be repeated",
+        [],
+        default_text="the mission's events",
+        flag="--event",
+        metavar="capture@T:TARGET|release@T[:SPEED]",
+    )
+    seed: int = option("Seed of the random numbers of faults and sensors", 0, low=0)
+    controller_code: str = option(
+        "What answers as the controller: its kernels compiled here (python), the same as C, "
+        "built by the system's compiler (c), or a flight computer at udp:HOST:PORT",
+        "python",
+        metavar="CODE",
+    )
+    shadow: Literal["none", "c"] = option(
+        "Let the C code answer, too, and end the flight with exit code 1 at the first number "
+        "that differs",
+        "none",
+    )
+    realtime: bool = option("Pace by the wall clock instead of lockstep", False, needs_graph=True)
+    paused: bool = option(
+        "Begin paused: `space-robot sim` resumes the plant, or steps it", False, needs_graph=True
+    )
+    fifo_priority: int = option(
+        "Ask for SCHED_FIFO for plant and controller; for machines with cores to spare",
+        0,
+        needs_graph=True,
+        low=0,
+        high=98,
+    )
+    namespace: str = option(
+        "ROS namespace of the nodes and their topics, as /sat1: one for each robot in a domain",
+        "/",
+        metavar="NS",
+        needs_graph=True,
+    )
+    composed: bool = option(
+        "Run all nodes in one process: faster, and no node can be killed or stopped alone",
+        False,
+        needs_graph=True,
+        is_launched=False,
+    )
+    without: list[Literal["controller", "mission"]] = option(
+        "Do not start this node, controller or mission: the flight waits for one of your own; "
+        "may be repeated",
+        [],
+        metavar="NODE",
+        needs_graph=True,
+    )
+    join_timeout: float = option(
+        "Longest wait for the nodes of --without, s of the wall clock (0: no limit)",
+        60.0,
+        needs_graph=True,
+        low=0.0,
+        high=1e6,
+    )
+    restart_controller: bool = option(
+        "Restart a controller that died or hangs", False, needs_graph=True, is_launched=False
+    )
+    domain: int | None = option(
+        "ROS domain",
+        None,
+        default_text="ROS_DOMAIN_ID, or a free one",
+        needs_graph=True,
+        is_launched=False,
+        low=0,
+        high=232,
+    )
+    parameters: dict[str, dict[str, Any]] = {}  # noqa: RUF012 - Pydantic copies it
+    """Further parameters by node, dotted names."""
+
+
+OPTIONS: dict[str, Option] = {}
+"""The options of a command line by name: all fields but `parameters`."""
+
+
+def _read_fields() -> None:
+    """Collect the options; Pydantic finds defaults and limits in their places."""
+    for name, hint in get_type_hints(Options).items():
+        if isinstance(declared := vars(Options)[name], Option):
+            OPTIONS[name] = declared.with_type(hint)
+            ends = ((Ge, declared.low), (Le, declared.high), (Gt, declared.above))
+            limits = [limit(value) for limit, value in ends if value is not None]
+            if limits:
+                Options.__annotations__[name] = Annotated[(hint, *limits)]
+            setattr(Options, name, declared.default)
+
+
+_read_fields()

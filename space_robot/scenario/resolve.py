@@ -22,14 +22,14 @@ from space_robot_sim.faults.grammar import Fault, parse_faults
 
 from .disturbances import sampled
 from .faults import KINDS, NODE_OF, PROCESS_KINDS
-from .node_settings import FlightSettings
+from .node_settings import FlightSettings, option_parameters
 from .objects import resolve_law
-from .options import FlightPlan
 from .resolved import ResolvedScenario
 from .robots import Robots
+from .scenario import Scenario
 
 
-def resolve(plan: FlightPlan) -> ResolvedScenario:
+def resolve(plan: Scenario) -> ResolvedScenario:
     """Read all files that the options name, and check that they fit together.
 
     Args:
@@ -39,7 +39,7 @@ def resolve(plan: FlightPlan) -> ResolvedScenario:
         InputError: a name does not exist, or settings conflict.
     """
     plan = _without_nodes(plan)
-    settings = FlightSettings.resolve(plan.options(), plan.parameters)
+    settings = FlightSettings.resolve(plan)
     with explained_by("own-robot"):
         robots = Robots(settings, plan.robot, plan.plant_robot)
     laws = _laws(plan, settings, robots.plant.n + 3)
@@ -94,11 +94,11 @@ def _mission(settings: FlightSettings, robot: Robot) -> Mission:
 
 
 @explained_by("disturbances")
-def _process_faults(plan: FlightPlan) -> list[Fault]:
+def _process_faults(plan: Scenario) -> list[Fault]:
     return parse_faults(plan.faults_of(PROCESS_KINDS), KINDS)
 
 
-def _laws(plan: FlightPlan, settings: FlightSettings, axes: int) -> dict[str, ControlLaw]:
+def _laws(plan: Scenario, settings: FlightSettings, axes: int) -> dict[str, ControlLaw]:
     if plan.controller is None:
         return {NoLaw.name: NoLaw({}, settings.plant.period, axes)}
     own = resolve_law(plan.controller)
@@ -109,7 +109,7 @@ def _laws(plan: FlightPlan, settings: FlightSettings, axes: int) -> dict[str, Co
 
 
 def _assumed_actuators(
-    plan: FlightPlan, settings: FlightSettings, robot: Robot
+    plan: Scenario, settings: FlightSettings, robot: Robot
 ) -> BaseActuatorSettings:
     name = settings.controller.actuators
     if isinstance(plan.assumed_actuators, str):
@@ -140,7 +140,7 @@ OF_NODES = {
 """Options that say nothing where a node is another's."""
 
 
-def _without_nodes(plan: FlightPlan) -> FlightPlan:
+def _without_nodes(plan: Scenario) -> Scenario:
     """Check what is asked of nodes that are not started; a flight without controller has no law.
 
     Raises:
@@ -150,7 +150,7 @@ def _without_nodes(plan: FlightPlan) -> FlightPlan:
         asked = [
             name
             for name in OF_NODES[node]
-            if getattr(plan, name) not in (FlightPlan.model_fields[name].default, None, [])
+            if getattr(plan, name) not in (Scenario.model_fields[name].default, None, [])
         ]
         asked += [f"{node}.{name}" for name in plan.parameters.get(node, {})]
         faults = parse_faults(plan.faults_of(PROCESS_KINDS), KINDS)
@@ -162,7 +162,7 @@ def _without_nodes(plan: FlightPlan) -> FlightPlan:
     return plan.model_copy(update={"controller": None}) if "controller" in plan.without else plan
 
 
-def _check_composed(plan: FlightPlan) -> None:
+def _check_composed(plan: Scenario) -> None:
     if not plan.composed:
         return
     asked = [f"fault {fault}" for fault in plan.faults_of(PROCESS_KINDS)]
@@ -174,11 +174,11 @@ def _check_composed(plan: FlightPlan) -> None:
 
 
 @explained_by("disturbances")
-def _check_disturbance(plan: FlightPlan, scenario: ResolvedScenario) -> None:
+def _check_disturbance(plan: Scenario, scenario: ResolvedScenario) -> None:
     """Check the columns of a file that was given, which the plant does not know, for the robot."""
     if not (text := scenario.plant.disturbance.table):
         return
-    parameters = {**plan.options().get("plant", {}), **plan.parameters.get("plant", {})}
+    parameters = option_parameters(plan)["plant"]
     file = dict(flatten(nest(parameters))).get("disturbance.table", "")
     if file and not file.startswith(JSON):
         joints = scenario.plant.robot_names(scenario.robots.plant).joints

@@ -33,8 +33,8 @@ from space_robot_sim.plant.settings import MOST_TICKS, PLANT_KINDS, PlantNodeSet
 
 from .faults import PROCESS_KINDS
 from .node_settings import NODES, NOT_TO_BE_SET, FlightSettings
-from .options import FlightPlan
 from .robots import Robots
+from .scenario import Scenario
 
 SECTIONS: Mapping[str, type[BaseModel]] = {
     "case": EnvironmentSettings,
@@ -66,7 +66,7 @@ class ResolvedScenario:
     The settings are decisive, not the options: single parameters override options.
     """
 
-    options: FlightPlan
+    options: Scenario
     """Options as the user wrote them."""
     settings: FlightSettings
     """Settings of every node."""
@@ -177,7 +177,7 @@ class ResolvedScenario:
     def tree(self) -> dict[str, Any]:
         """The options with every number, as plain mappings, lists and texts.
 
-        It is a mapping of options as `FlightPlan` takes them, so that a printed one can be flown.
+        It is a mapping of options as `Scenario` takes them, so that a printed one can be flown.
         Equal trees fly equal bits.
         """
         return _tree(self)

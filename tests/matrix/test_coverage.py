@@ -13,7 +13,7 @@ from pydantic import BaseModel
 from matrix.scenarios import CELLS, PLANS, in_root
 from space_robot.flight.plan import Flight
 from space_robot.scenario.faults import KINDS, PROCESS_KINDS
-from space_robot.scenario.option_table import names
+from space_robot.scenario.options import OPTIONS
 from space_robot_control.guidance.goals import GoalFrame, Point
 from space_robot_control.guidance.segments import (
     BASE_KINDS,
@@ -76,7 +76,8 @@ def test_all_that_is_shipped_flies(option: str, folder: str) -> None:
 
 def test_every_option_is_used() -> None:
     used = {name for plan in PLANS.values() for name in plan.options}
-    assert lacking(names(needs_graph=False), used | NO_FLIGHT_S_OWN.keys()) == []
+    flown = [name for name, option in OPTIONS.items() if not option.needs_graph]
+    assert lacking(flown, used | NO_FLIGHT_S_OWN.keys()) == []
 
 
 def test_every_law_answers() -> None:

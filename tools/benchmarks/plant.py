@@ -15,7 +15,7 @@ from scipy import optimize
 
 from space_robot import Scenario
 from space_robot.flight.batch.batch import FlightBatch
-from space_robot.flight.plan import Flight, FlightPlan, resolve
+from space_robot.flight.plan import Flight, resolve
 from space_robot.flight.simulate import simulate
 from space_robot_control.controller.controller import Controller
 from space_robot_control.laws import CompiledLaw, find_law
@@ -47,7 +47,7 @@ LIMIT = 0.7
 
 def flight_of(**settings: Any) -> Flight:
     """Return a new flight."""
-    return Flight(resolve(FlightPlan.model_validate(settings)))
+    return Flight(resolve(Scenario.model_validate(settings)))
 
 
 def moving_plant(**options: Any) -> Plant:

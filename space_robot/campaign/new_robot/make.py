@@ -30,7 +30,7 @@ from ...analysis import measure
 from ...analysis.measure import column_unit
 from ...analysis.words import of_statistic
 from ...console.files import whole_folder
-from ...flight.plan import Flight, FlightPlan, resolve
+from ...flight.plan import Flight, Scenario, resolve
 from ...flight.simulate import simulate
 from ...processes.pool import cores, run_all
 from ...tuning.demand import demand
@@ -230,7 +230,7 @@ def make_robot(
 
 
 def _fly(folder: Path, law: str) -> Outcome:
-    plan = FlightPlan(controller=law, robot=str(folder), case=CASE)
+    plan = Scenario(controller=law, robot=str(folder), case=CASE)
     try:
         metrics = _metrics(plan)
     except FlightError as error:
@@ -239,7 +239,7 @@ def _fly(folder: Path, law: str) -> Outcome:
     return Outcome(rms, "", *_trial(plan.model_copy(update=TRIAL)))
 
 
-def _trial(plan: FlightPlan) -> tuple[float, str]:
+def _trial(plan: Scenario) -> tuple[float, str]:
     """Fly a trial and return its score and how it failed.
 
     Equal ratios count alike in the score, so that units do not matter.
@@ -257,7 +257,7 @@ def _trial(plan: FlightPlan) -> tuple[float, str]:
     return math.exp(float(np.mean(np.log(values)))), ""
 
 
-def _metrics(plan: FlightPlan) -> dict[str, float]:
+def _metrics(plan: Scenario) -> dict[str, float]:
     """Return the metrics of a flight.
 
     Raises:

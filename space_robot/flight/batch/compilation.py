@@ -20,7 +20,7 @@ from space_robot_sim.plant.tick import PlantMemory
 
 from ...processes.child_process import child_process
 from ..compilation import compile_kernels, compiling, laws_with_gains, mark_of
-from ..plan import Flight, FlightPlan, resolve
+from ..plan import Flight, Scenario, resolve
 from .batch import FlightBatch
 from .bench_loop import fly_benches
 from .benches import Benches
@@ -79,10 +79,10 @@ def _fly_all_laws() -> None:
     """Fly a few ticks under every law with a kernel, and one on a bench."""
     for name, law in laws_with_gains().items():
         if issubclass(law, CompiledLaw):
-            plan = FlightPlan(controller=name, duration=0.002)
+            plan = Scenario(controller=name, duration=0.002)
             for _ in FlightBatch([Flight(resolve(plan)) for _ in range(2)]).fly():
                 pass
-    benches = Benches([Flight(resolve(FlightPlan(duration=0.002)))])
+    benches = Benches([Flight(resolve(Scenario(duration=0.002)))])
     benches.step(np.zeros((1, len(benches.names.commanded))))
 
 

@@ -11,7 +11,7 @@ from ...analysis.figures import chatter, desired_joints, junctions
 from ...analysis.figures.figure_set import FigureFolder, SavedFigure
 from ...analysis.figures.flight_curves import BaseTorque
 from ...flight.flown_log import empty_log
-from ...flight.plan import Flight, FlightPlan, resolve
+from ...flight.plan import Flight, Scenario, resolve
 from .flights import ROBOT, Result, TableRow
 
 FIGURE_OF_CASE = {"1": "6", "2": "7", "3": "8", "4-1": "9a", "4-2": "9b"}
@@ -42,7 +42,7 @@ def comparisons(
 
 
 def _draw_mission(duration: float | None, folder: FigureFolder) -> None:
-    log = empty_log(Flight(resolve(FlightPlan(robot=ROBOT, duration=duration))))
+    log = empty_log(Flight(resolve(Scenario(robot=ROBOT, duration=duration))))
     folder.save(desired_joints(log), MISSION)
 
 

@@ -14,7 +14,7 @@ from ...analysis.figures import control_results
 from ...analysis.figures.figure_set import FigureFolder
 from ...analysis.figures.flight_curves import BaseTorque
 from ...analysis.measure import measure
-from ...flight.plan import Flight, FlightPlan, resolve
+from ...flight.plan import Flight, Scenario, resolve
 from ...flight.simulate import simulate
 from .table_v import COLUMNS, PRINTED, TORQUE
 
@@ -148,7 +148,7 @@ def fly(
     row, variant, _ = planned
     flight = Flight(
         resolve(
-            FlightPlan(
+            Scenario(
                 controller=row.controller,
                 case=row.case,
                 gains=variant.gains,

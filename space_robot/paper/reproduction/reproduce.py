@@ -16,7 +16,7 @@ from space_robot_msgs_py.errors import InputError
 from ...analysis.figures.figure_set import FigureFolder
 from ...analysis.template import template
 from ...console.tables import as_csv, as_markdown, as_records
-from ...flight.plan import Flight, FlightPlan, resolve
+from ...flight.plan import Flight, Scenario, resolve
 from ...processes.pool import run_all
 from ...processes.software import commit, versions
 from .claims import claims, claims_table
@@ -73,7 +73,7 @@ def reproduce(
         InputError: the folder contains other files, or the base has no attitude actuators.
     """
     check_folder(folder)
-    if not Flight(resolve(FlightPlan(actuators=equipment.actuators))).controls_base:
+    if not Flight(resolve(Scenario(actuators=equipment.actuators))).controls_base:
         raise InputError(
             f"actuators {equipment.actuators}: Table V has attitude errors and base torques, so "
             "the base needs attitude actuators"

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from space_robot_msgs_py.bag.flight_log import FlightLog
 
-from ...flight.plan import Flight, FlightPlan
+from ...flight.plan import Flight, Scenario
 
 Array = NDArray[np.float64]
 
@@ -42,7 +42,7 @@ class Reaching:
     """(m,) reaching time, s; NaN if the surface was not reached."""
 
 
-def off_mission_plan(flight: Flight, initial_error: float) -> FlightPlan:
+def off_mission_plan(flight: Flight, initial_error: float) -> Scenario:
     """Return the plan of ``flight``, started at rest with ``e = initial_error`` on every axis."""
     start = flight.mission.chunk(0, 1)
     eps = start.base[0, 1:4] - initial_error

@@ -9,7 +9,7 @@ from space_robot_control.laws import laws
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.errors import InputError
 
-from ...flight.plan import NO_FRICTION, Flight, FlightPlan, resolve
+from ...flight.plan import NO_FRICTION, Flight, Scenario, resolve
 from .lemma_1 import Contraction, contraction
 from .reaching import off_mission_plan, reaching, ripple
 from .super_twisting import SuperTwisting
@@ -59,7 +59,7 @@ def check_law(flight: Flight) -> None:
         )
 
 
-def study(plan: FlightPlan, initial_error: float, fly: Fly) -> StabilityStudy:
+def study(plan: Scenario, initial_error: float, fly: Fly) -> StabilityStudy:
     """Fly the flights of the study and check every condition of the paper.
 
     Args:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from space_robot.analysis.errors import tracking_error
 from space_robot.flight.closed_loop import close_loop
 from space_robot.flight.flown_log import empty_log
-from space_robot.flight.plan import Flight, FlightPlan, resolve
+from space_robot.flight.plan import Flight, Scenario, resolve
 from space_robot_control.controller.controller import TRANSFER_S, Controller
 from space_robot_control.controller.gains import build_law
 from space_robot_control.controller.law_choice import Swap, parse_swaps
@@ -63,7 +63,7 @@ NO_TIME = r"T must be from 0 to 1e\+09 s"
 )
 def test_a_wrong_swap_is_refused_before_the_flight(texts: list[str], said: str) -> None:
     with pytest.raises(InputError, match=said):
-        Flight(resolve(FlightPlan(swaps=texts)))
+        Flight(resolve(Scenario(swaps=texts)))
 
 
 # Taking over
@@ -89,7 +89,7 @@ class CommonBeginning:
     def __init__(self, law: str, **plan: object) -> None:
         gains = {name_of(law): {"h_bar": ["nominal"]}} if law in NOMINAL else "tuned"
         content = {"controller": name_of(law), "gains": gains, "duration": 1.05, **plan}
-        self.flight = Flight(resolve(FlightPlan.model_validate(content)))
+        self.flight = Flight(resolve(Scenario.model_validate(content)))
         self.log = empty_log(self.flight)
         close_loop(self.flight.plant, self.flight.controller, self.log, 0, TAKEOVER)
         plant = self.flight.plant

@@ -11,7 +11,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from space_robot.export.software import export
-from space_robot.flight.plan import Flight, FlightPlan, resolve
+from space_robot.flight.plan import Flight, Scenario, resolve
 from space_robot_control.controller.signals import USABLE
 from space_robot_control.controller.supervisor import Supervisor
 from space_robot_control.controller.tick import (
@@ -40,7 +40,7 @@ SETTINGS = {"navigation": "filtered", "sensors": "fine", "actuators": "wheels_an
 
 
 def flight_of(law: str) -> Flight:
-    return Flight(resolve(FlightPlan(controller=law, **SETTINGS)))
+    return Flight(resolve(Scenario(controller=law, **SETTINGS)))
 
 
 @cache

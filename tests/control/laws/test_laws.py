@@ -14,7 +14,7 @@ from law_equations import EQUATIONS, PERIOD, History, forces, random_gains
 from numpy.typing import NDArray
 from paths import ROOT
 
-from space_robot.flight.plan import Flight, FlightPlan, resolve
+from space_robot.flight.plan import Flight, Scenario, resolve
 from space_robot.flight.simulate import simulate
 from space_robot_control.laws import CompiledLaw, ControlLaw, Signals, find_law, laws
 from space_robot_control.laws.base import CONSTANT_INERTIA, NO_ESTIMATE, NOMINAL_INERTIA
@@ -123,7 +123,7 @@ def test_the_integral_in_the_manual_is_kept_and_begins_at_zero(tmp_path: Path) -
     module = re.search(r"```python\n(# my_pid.py.*?)```", manual, re.DOTALL)
     assert module
     (tmp_path / "my_pid.py").write_text(module[1])
-    plan = FlightPlan(
+    plan = Scenario(
         controller=f"{tmp_path}/my_pid.py:Pid",
         gains={"pid": {"k_p": [100.0], "k_i": [100.0], "k_d": [20.0]}},
         case="3",
@@ -139,7 +139,7 @@ def test_the_integral_in_the_manual_is_kept_and_begins_at_zero(tmp_path: Path) -
 
 def test_numba_finds_one_type_for_all_laws_and_keeps_it() -> None:
     """Else a kernel that is called with a law looks for the type anew, at every tick."""
-    flown = Flight(resolve(FlightPlan())).laws.values()
+    flown = Flight(resolve(Scenario())).laws.values()
     codes = [law.code for law in flown if isinstance(law, CompiledLaw)]
     first, again = ([numba.typeof(code) for code in codes] for _ in range(2))
     assert len(codes) == len(laws())

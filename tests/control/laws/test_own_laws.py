@@ -17,7 +17,7 @@ from command import Run
 
 from space_robot.analysis import analyze
 from space_robot.campaign.store.software import file_digests
-from space_robot.flight.plan import Flight, FlightPlan, resolve
+from space_robot.flight.plan import Flight, Scenario, resolve
 from space_robot.flight.replay.choice import ControllerChoice
 from space_robot.flight.simulate import simulate
 from space_robot.processes.interruption import Interrupted
@@ -213,7 +213,7 @@ STRANGER = CODE.format(name="stranger").replace("Mine", "Stranger")
 @pytest.fixture(scope="module")
 def bag(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("trust") / "bag"
-    simulate(Flight(resolve(FlightPlan(duration=0.05))), path)
+    simulate(Flight(resolve(Scenario(duration=0.05))), path)
     return path
 
 
@@ -229,7 +229,7 @@ def ran(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[], bool]:
 
 def described(**changes: Any) -> dict[str, Any]:
     """A description as of an older bag, whose parameters hold no gains."""
-    description = json.loads(json.dumps(Flight(resolve(FlightPlan())).description))
+    description = json.loads(json.dumps(Flight(resolve(Scenario())).description))
     recorded, _ = split_gains(description["parameters"]["controller"])
     parameters = dict(flatten(recorded)) | changes.pop("controller_node", {})
     description["parameters"]["controller"] = parameters

@@ -23,7 +23,7 @@ from space_robot.analysis.generalised_motion import neglected_force
 from space_robot.analysis.report_tables import comparison_table, rms_table
 from space_robot.analysis.waypoints import junction_ticks, settling, waypoint_ticks
 from space_robot.flight.flown_log import empty_log
-from space_robot.flight.plan import Flight, FlightPlan, resolve
+from space_robot.flight.plan import Flight, resolve
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.samples import Timebase
@@ -42,7 +42,7 @@ def log_with(speed: np.ndarray, first_tick: int = 0) -> FlightLog:
 
 def planned_log(duration: float) -> FlightLog:
     """The paper's mission, whose waypoints are at 0, 15 and 30 s."""
-    return empty_log(Flight(resolve(FlightPlan(duration=duration))))
+    return empty_log(Flight(resolve(Scenario(duration=duration))))
 
 
 def settled(log: FlightLog) -> dict[str, float]:

@@ -23,7 +23,7 @@ from space_robot.analysis import excerpt
 from space_robot.analysis.described import robot_of
 from space_robot.analysis.errors import tracking_error
 from space_robot.cli.main import main
-from space_robot.flight.plan import Flight, FlightPlan, resolve
+from space_robot.flight.plan import Flight, Scenario, resolve
 from space_robot.flight.simulate import simulate
 from space_robot.view.flights import shown_robot
 from space_robot_msgs_py.bag.reader import read_flight
@@ -43,8 +43,8 @@ def view(space_robot: Run, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> R
 def bags(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
     """Of two laws."""
     folder = tmp_path_factory.mktemp("bags")
-    simulate(Flight(resolve(FlightPlan(duration=0.3))), folder / "first")
-    simulate(Flight(resolve(FlightPlan(controller="ctc", duration=0.3))), folder / "second")
+    simulate(Flight(resolve(Scenario(duration=0.3))), folder / "first")
+    simulate(Flight(resolve(Scenario(controller="ctc", duration=0.3))), folder / "second")
     return folder / "first", folder / "second"
 
 
@@ -150,7 +150,7 @@ def flown_arm(tmp_path: Path) -> Path:
     segments = [{"joints_deg": [5.0], "duration": 4.0}]
     mission = {"start": {"joints_deg": [0.0]}, "segments": segments}
     plan = {"robot": str(robot), "mission": mission, "gains": gains, "controller": "ctc"}
-    simulate(Flight(resolve(FlightPlan(**plan, duration=0.1))), tmp_path / "flown")
+    simulate(Flight(resolve(Scenario(**plan, duration=0.1))), tmp_path / "flown")
     return urdf
 
 
@@ -260,7 +260,7 @@ def test_a_bag_that_nobody_finished_is_analysed_and_said_so(
 
 
 def test_a_robot_that_is_not_here_costs_only_its_figures(analyze: Run, tmp_path: Path) -> None:
-    flight = Flight(resolve(FlightPlan(duration=0.05)))
+    flight = Flight(resolve(Scenario(duration=0.05)))
     log = simulate(flight)
     log.scenario = None
     log.flight.pop("robot_file", None)

@@ -18,7 +18,7 @@ from space_robot.campaign.row.fly import RowFlyer
 from space_robot.campaign.row.row import Task
 from space_robot.campaign.study import Study, read_study
 from space_robot.cli.main import cli
-from space_robot.flight.plan import Flight, FlightPlan, resolve
+from space_robot.flight.plan import Flight, Scenario, resolve
 from space_robot.flight.simulate import simulate
 from space_robot_control.controller.settings import ControllerNodeSettings
 from space_robot_control.laws import laws
@@ -118,11 +118,11 @@ def test_a_set_for_a_mission_that_points_needs_its_orbit_and_knows_the_tick(tmp_
 def test_a_set_for_segments_is_in_the_bag_and_may_be_overruled(tmp_path: Path) -> None:
     """Also what it says to the controller."""
     assert tune(tmp_path, "--mission", "line").exit_code == 0
-    flight = Flight(resolve(FlightPlan(gains=str(tmp_path))))
+    flight = Flight(resolve(Scenario(gains=str(tmp_path))))
     corner = flight.controller_settings.acceleration_filter_hz
     assert flight.description["parameters"]["controller"]["acceleration_filter_hz"] == corner > 0.0
     given = {"controller": {"acceleration_filter_hz": 7.0}}
-    over = Flight(resolve(FlightPlan(gains=str(tmp_path), parameters=given)))
+    over = Flight(resolve(Scenario(gains=str(tmp_path), parameters=given)))
     assert over.controller_settings.acceleration_filter_hz == 7.0
     alone = ControllerNodeSettings.resolve({"gains": str(tmp_path)})  # as a node by itself has it
     assert alone.acceleration_filter_hz == corner
@@ -154,7 +154,7 @@ def test_auto_says_why_it_takes_the_nominal_inertia_which_flies(tmp_path: Path) 
     assert masses["wrong_masses"]["largest"] == pytest.approx(1.0 / 0.9)
     text = run("check", *own).stdout
     assert "h_bar of indi, tde_smc, tde_stc, tde_tsmc is H_S of the nominal model" in text
-    simulate(Flight(resolve(FlightPlan(gains=str(tmp_path), duration=0.05))))
+    simulate(Flight(resolve(Scenario(gains=str(tmp_path), duration=0.05))))
 
 
 @pytest.fixture(scope="module")

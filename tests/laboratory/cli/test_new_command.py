@@ -33,7 +33,7 @@ from space_robot.campaign.new_robot.make import (
 from space_robot.cli.main import cli
 from space_robot.cli.new import new as new_command
 from space_robot.cli.new_files import LAW, METRIC, MISSION, SENSOR
-from space_robot.flight.plan import Flight, FlightPlan, resolve
+from space_robot.flight.plan import Flight, Scenario, resolve
 from space_robot.flight.simulate import simulate
 from space_robot.tuning.method import Tuned
 from space_robot.tuning.task import TuningOptions
@@ -75,8 +75,8 @@ def test_a_file_becomes_a_folder_that_flies(tmp_path: Path) -> None:
     assert report["remarks"][0].startswith(f"{best} is flown unless another law is named")
     plain = json.loads(run("simulate", "--robot", "mine", "--duration", "0.01", "--json").stdout)
     assert plain["controller"] == best
-    assert Flight(resolve(FlightPlan(robot="mine"))).description["mission"] == "mine"
-    named = resolve(FlightPlan(robot="mine", controller="tde_stc"))
+    assert Flight(resolve(Scenario(robot="mine"))).description["mission"] == "mine"
+    named = resolve(Scenario(robot="mine", controller="tde_stc"))
     assert named.law.name == "tde_stc"
     file = tmp_path / "mine/campaign.yaml"
     content = yaml.safe_load(file.read_text("utf-8"))
@@ -96,18 +96,18 @@ def test_a_gain_set_names_shipped_laws_only(tmp_path: Path) -> None:
     shutil.copytree(CONFIG / "gains/paper/tuned", own)
     text = "controller_node:\n  ros__parameters:\n    controller: "
     (own / "controller.yaml").write_text(f"{text}pd\n")
-    assert resolve(FlightPlan(gains=f"{own}/")).law.name == "pd"
+    assert resolve(Scenario(gains=f"{own}/")).law.name == "pd"
     (own / "controller.yaml").write_text(f"{text}evil.py:Law\n")
     with pytest.raises(InputError, match=r"unknown controller 'evil.py:Law' of controller.yaml"):
-        resolve(FlightPlan(gains=f"{own}/"))
-    assert resolve(FlightPlan(gains=f"{own}/", controller="ctc")).law.name == "ctc"
+        resolve(Scenario(gains=f"{own}/"))
+    assert resolve(Scenario(gains=f"{own}/", controller="ctc")).law.name == "ctc"
 
 
 def test_a_law_that_cannot_fly_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
     def fly(flight: Flight) -> FlightLog:
         if flight.controller.law.name == "tde_smc":
             raise DivergedError(7, 0.0005, "too fast")
-        return simulate(Flight(resolve(FlightPlan(robot=FILE, duration=0.01))))
+        return simulate(Flight(resolve(Scenario(robot=FILE, duration=0.01))))
 
     monkeypatch.setattr("space_robot.campaign.new_robot.make.simulate", fly)
     result = new(FILE)
@@ -217,7 +217,7 @@ def test_files_for_other_joints_name_the_command_that_mends_them(stale: str) -> 
     with Path("mine/robot.yaml").open("a") as file:
         file.write("  passive: {slide: {stiffness: 15.0, damping: 0.05}}\n")
     with pytest.raises(InputError) as caught:
-        resolve(FlightPlan(robot="mine", controller="ctc"))
+        resolve(Scenario(robot="mine", controller="ctc"))
     command = "`space-robot new mine/ --out mine --force` makes mission and gains anew"
     assert command in str(caught.value)
     said = {"mission": "mine/mission.yaml: the start has", "gains": "were expected, got 5: ["}

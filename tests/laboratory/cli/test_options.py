@@ -18,23 +18,23 @@ from space_robot.cli import main as cli
 from space_robot.cli.fly import fly
 from space_robot.cli.launch_arguments import launch_arguments, launched_flight, refuse_unknown
 from space_robot.cli.numbers import FiniteRange
-from space_robot.cli.scenario_option import NODES, _set
 from space_robot.cli.simulate import simulate
 from space_robot.flight.graph.node_names import started_nodes
 from space_robot.flight.graph.orchestrator import flight_parameters
-from space_robot.flight.plan import Flight, FlightPlan, resolve
-from space_robot.scenario.option_table import OPTIONS, Option, names
+from space_robot.flight.plan import Flight, Scenario, resolve
+from space_robot.scenario.objects import NODES, set_parameter
+from space_robot.scenario.options import OPTIONS
 from space_robot_msgs_py.config.validation import validate
 from space_robot_msgs_py.errors import InputError
 
 
 @pytest.fixture
-def planned(monkeypatch: pytest.MonkeyPatch) -> list[FlightPlan]:
+def planned(monkeypatch: pytest.MonkeyPatch) -> list[Scenario]:
     """The plans that commands make, which are then not flown."""
-    plans: list[FlightPlan] = []
+    plans: list[Scenario] = []
 
     def plan(**options: Any) -> Any:
-        plans.append(validate(FlightPlan, options, "options"))
+        plans.append(validate(Scenario, options, "options"))
         raise InputError("not to be flown")
 
     monkeypatch.setattr("space_robot.cli.simulate.plan_flight", plan)
@@ -52,7 +52,7 @@ def said_by(*arguments: str) -> str:
     return str(result.exception)
 
 
-def test_what_is_given_comes_over_the_scenario(planned: list[FlightPlan], tmp_path: Path) -> None:
+def test_what_is_given_comes_over_the_scenario(planned: list[Scenario], tmp_path: Path) -> None:
     """Options and parameters; the others of both count."""
     path = tmp_path / "scenario.yaml"
     path.write_text(
@@ -78,7 +78,7 @@ def test_a_folder_of_gains_needs_no_slash(tmp_path: Path, monkeypatch: pytest.Mo
         "{h_bar: [50], lambda: [3], k_1: [0.02], k_2: [8.0e-5]}}}"
     )
     monkeypatch.chdir(tmp_path)
-    bare, slash = (Flight(resolve(FlightPlan(gains=gains))) for gains in ("g", "g/"))
+    bare, slash = (Flight(resolve(Scenario(gains=gains))) for gains in ("g", "g/"))
     assert bare.scenario.gains_used == slash.scenario.gains_used
     assert bare.description == slash.description
 
@@ -89,7 +89,7 @@ def test_a_plant_robot_of_the_same_numbers_is_no_other_robot(tmp_path: Path) -> 
         content["robot"]["base"]["mass"] = mass
         file = tmp_path / f"{number}.yaml"
         file.write_text(yaml.safe_dump(content))
-        flight = Flight(resolve(FlightPlan(plant_robot=str(file))))
+        flight = Flight(resolve(Scenario(plant_robot=str(file))))
         assert ("controller_robot_file" in flight.description) == (number > 0)
         assert ("plant_robot" in flight.scenario.tree) == (number > 0)
 
@@ -120,8 +120,8 @@ def test_any_parameters_fly_or_are_refused_in_one_line(pairs: list[tuple[str, st
     tree: dict[str, dict[str, Any]] = {}
     try:
         for name, value in pairs:
-            _set(tree, f"{name}={value}", "--set")
-        Flight(resolve(validate(FlightPlan, {"parameters": tree}, "options")))
+            set_parameter(tree, f"{name}={value}", "--set")
+        Flight(resolve(validate(Scenario, {"parameters": tree}, "options")))
     except InputError as error:
         assert len(str(error).splitlines()) == 1  # noqa: PT017
 
@@ -143,32 +143,22 @@ def test_a_number_out_of_its_range_is_refused(text: str, said: str) -> None:
     assert FiniteRange(0.0, 0.5, min_open=True).convert("0.5", None, None) == 0.5
 
 
-NOT_TYPED = {"parameters"}
-"""With a form of its own on the command line."""
-
-
-def test_the_plan_has_the_options_of_the_table() -> None:
-    assert set(FlightPlan.model_fields) == {*names(), *NOT_TYPED}
-
-
-@pytest.mark.parametrize("option", OPTIONS, ids=lambda option: option.name)
-def test_an_option_is_the_same_everywhere(option: Option) -> None:
-    field = FlightPlan.model_fields[option.name]
-    assert field.description == option.help_text
-    default = field.get_default(call_default_factory=True)
-    assert default == ([] if option.kind == "texts" else option.default)
+@pytest.mark.parametrize("name", OPTIONS)
+def test_an_option_is_the_same_everywhere(name: str) -> None:
+    option, default = OPTIONS[name], OPTIONS[name].default
+    field = Scenario.model_fields[name]
+    assert (field.description, field.default) == (option.help_text, default)
     of_fly, of_simulate = (
         {p.name: p for p in command.params if isinstance(p, click.Option)}
         for command in (fly, simulate)
     )
-    assert option.name in of_fly
-    assert (option.name in of_simulate) == (not option.needs_graph)
+    assert (name in of_fly, name in of_simulate) == (True, not option.needs_graph)
     launched = {
         argument.name
         for argument in launch_arguments()
         if argument.description.startswith(option.help_text.partition(" [default")[0])
     }
-    flags = {max(of_fly[option.name].opts, key=len).lstrip("-").replace("-", "_")}
+    flags = {max(of_fly[name].opts, key=len).lstrip("-").replace("-", "_")}
     assert launched == (flags if option.is_launched else set())
 
 
@@ -177,7 +167,7 @@ def test_the_flight_is_the_one_of_the_command(tmp_path: Path) -> None:
     given |= {"friction": "false", "realtime": "true", "namespace": "sat1", "duration": "3"}
     given |= {"swap": "1:ctc 2:tde_smc", "fault": "", "bag": str(tmp_path / "bag")}
     flight, bag, _ = launched_flight(given)
-    plan = FlightPlan(
+    plan = Scenario(
         controller="tde_tsmc",
         case="4-2",
         command_latency_ticks=2,

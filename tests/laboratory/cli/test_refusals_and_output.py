@@ -20,7 +20,7 @@ from paths import CONFIG, DATA
 from robots import driven_paper
 
 from space_robot.console.files import ABANDONED_S, whole_file, whole_folder
-from space_robot.flight.plan import Flight, FlightPlan, resolve
+from space_robot.flight.plan import Flight, Scenario, resolve
 from space_robot.flight.simulate import simulate
 from space_robot_model.robot.parts import MOST_PLATES
 from space_robot_msgs_py.errors import InputError
@@ -86,7 +86,7 @@ def content_of(group: Group, given: Any) -> str:
 @pytest.fixture(scope="module")
 def bag(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("bags") / "bag"
-    simulate(Flight(resolve(FlightPlan(controller="ctc", duration=0.3))), path)
+    simulate(Flight(resolve(Scenario(controller="ctc", duration=0.3))), path)
     return path
 
 

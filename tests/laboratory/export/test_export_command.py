@@ -18,7 +18,7 @@ from robots import driven_paper
 
 from space_robot.export.software import export
 from space_robot.export.verify import CROSS, EMULATORS
-from space_robot.flight.plan import Flight, FlightPlan, resolve
+from space_robot.flight.plan import Flight, Scenario, resolve
 from space_robot_control.flight_code.folder import Exported
 from space_robot_control.laws import laws
 from space_robot_model.robot import Robot
@@ -225,7 +225,7 @@ RIGID: dict[str, Any] = {"sensors": "fine", "navigation": "filtered", "swaps": [
 
 
 def code_of(**options: Any) -> Exported:
-    return export(Flight(resolve(FlightPlan.model_validate(options))))
+    return export(Flight(resolve(Scenario.model_validate(options))))
 
 
 def test_gears_and_orbit_of_the_plant_are_no_part_of_the_flight_software() -> None:

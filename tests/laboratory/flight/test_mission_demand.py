@@ -22,7 +22,7 @@ from space_robot.flight.mission_demand import (
     held_base_remark,
     mission_demand,
 )
-from space_robot.flight.plan import Flight, FlightPlan, resolve
+from space_robot.flight.plan import Flight, Scenario, resolve
 from space_robot.flight.simulate import simulate
 from space_robot_model.hardware.base_actuators import BaseActuatorSettings
 from space_robot_model.robot import Robot
@@ -86,7 +86,7 @@ def test_the_momentum_is_that_which_a_flight_gives_its_base(paper_robot: Robot) 
         "start": {"joints_deg": POSTURE},
         "segments": [{**TURN, "joints_deg": [30, 60, 170, 40, 20, 40]}, {"hold": 90}],
     }
-    plan = FlightPlan(controller="ctc", mission=mission, orbit=WORLD, period=0.005, friction=False)
+    plan = Scenario(controller="ctc", mission=mission, orbit=WORLD, period=0.005, friction=False)
     flight = Flight(resolve(plan))
     log = simulate(flight)
     demands = list(mission_demand(paper_robot, flight.mission.pieces, flight.plant_settings))
@@ -170,7 +170,7 @@ def test_a_free_base_under_a_mission_that_holds_it_is_remarked(
 
 def test_missions_that_are_not_refused_are_warned_of_if_they_are_flown() -> None:
     remarks = [
-        demand_remark(resolve(FlightPlan(actuators=actuators, duration=duration)))
+        demand_remark(resolve(Scenario(actuators=actuators, duration=duration)))
         for actuators, duration in (("small_wheels", None), ("small_wheels", 0.1), ("wheels", None))
     ]
     assert "the mission's part 1 (joints) asks for " in remarks[0]

@@ -22,7 +22,7 @@ from rosbags.highlevel import AnyReader
 
 from space_robot.flight.flown_log import empty_log
 from space_robot.flight.graph.orchestrator import flight_parameters
-from space_robot.flight.plan import Flight, FlightPlan, resolve
+from space_robot.flight.plan import Flight, Scenario, resolve
 from space_robot.flight.simulate import simulate
 from space_robot.processes import software
 from space_robot.processes.node_modules import MODULES
@@ -123,7 +123,7 @@ def test_lists_go_to_the_nodes_as_declared(tmp_path: Path) -> None:
 
 
 def test_a_bag_has_all_to_fly_its_flight_again(tmp_path: Path) -> None:
-    plan = FlightPlan(
+    plan = Scenario(
         controller="tde_smc",
         case="3",
         seed=7,
@@ -286,7 +286,7 @@ def test_another_number_of_joints_compiles_nothing(options: dict[str, Any]) -> N
 def is_refused(options: dict[str, Any]) -> bool:
     """Tell if a flight of these options is refused, in one line; any other error is one here."""
     try:
-        flight = Flight(resolve(validate(FlightPlan, options, "options")))
+        flight = Flight(resolve(validate(Scenario, options, "options")))
     except InputError as error:
         assert len(str(error).splitlines()) == 1  # noqa: PT017
         return True
@@ -307,7 +307,7 @@ def test_any_parameter_and_option() -> None:
         for name, is_list in numbers_of(node):
             for value in (1e308, 5e-324):
                 is_refused({"parameters": {node.node: {name: [value] if is_list else value}}})
-    for name, _ in numbers_of(FlightPlan):
+    for name, _ in numbers_of(Scenario):
         for value in (1e308, 5e-324, float("nan"), float("inf"), -1):
             is_refused({name: value})
     for name in ("case", "sensors", "actuators", "robot", "mission", "gains"):  # as a name

@@ -18,7 +18,7 @@ from oracles import rho_space_inertia
 
 from space_robot.analysis.generalised_motion import continuous_error, mean_acceleration
 from space_robot.cli.main import cli
-from space_robot.flight.plan import Flight, FlightPlan, resolve
+from space_robot.flight.plan import Flight, Scenario, resolve
 from space_robot.flight.simulate import simulate
 from space_robot.paper.stability import StabilityStudy, report, study
 from space_robot.paper.stability.check import Check
@@ -161,14 +161,14 @@ def test_psi_makes_the_paper_s_equations_true() -> None:
 
 @pytest.mark.parametrize("robot", ["paper", "seven_joint"])
 def test_flight_starts_with_the_same_error_on_every_axis(robot: str) -> None:
-    flight = Flight(resolve(FlightPlan(robot=robot, duration=0.001, gains="tuned")))
+    flight = Flight(resolve(Scenario(robot=robot, duration=0.001, gains="tuned")))
     log = simulate(Flight(resolve(off_mission_plan(flight, 2e-3))))
     assert log.telemetry is not None
     np.testing.assert_allclose(log.telemetry[0, 3], 2e-3, rtol=1e-9)
     np.testing.assert_allclose(log.telemetry[0, 0], 3.0 * 2e-3, rtol=1e-9)  # s = lambda e
 
 
-def desired(plan: FlightPlan, every: float) -> tuple[Flight, FlightLog]:
+def desired(plan: Scenario, every: float) -> tuple[Flight, FlightLog]:
     """A log of the desired motion, a row each ``every`` seconds."""
     flight = Flight(resolve(plan))
     step = round(every / flight.period)
@@ -184,7 +184,7 @@ def desired(plan: FlightPlan, every: float) -> tuple[Flight, FlightLog]:
 
 def test_lemma_1_with_table_iv() -> None:
     """The printed h_bar does not meet the printed condition, but its spectral radius is below 1."""
-    flight, log = desired(FlightPlan(), every=0.0125)  # 40 samples of these make 20 s
+    flight, log = desired(Scenario(), every=0.0125)  # 40 samples of these make 20 s
     h_bar = np.array(H_BAR)
     found = contraction(flight.plant.robot, h_bar, log)
     assert found.norm_below_one.holds is False
@@ -206,7 +206,7 @@ def test_lemma_1_with_table_iv() -> None:
 def test_error_is_what_the_paper_defines(law: str, robot: str) -> None:
     """``h_bar eps = N - N_hat`` (65), N being the next tick's estimate, and ``eps = u - rhodd``."""
     plant = {"initial_quaternion": [0.9, 0.1, -0.3, 0.2], "base_torque_limit": 50.0}
-    plan = FlightPlan(
+    plan = Scenario(
         controller=law, case="2", robot=robot, duration=0.1, parameters={"plant": plant}
     )
     flight = Flight(resolve(plan))
@@ -247,7 +247,7 @@ def run(*arguments: str) -> str:
 
 
 def studied(**options: Any) -> StabilityStudy:
-    plan = FlightPlan.model_validate({"duration": 0.1, **options})
+    plan = Scenario.model_validate({"duration": 0.1, **options})
     return study(plan, 1e-3, lambda flight, which: simulate(flight))
 
 
@@ -313,7 +313,7 @@ def test_what_cannot_be_studied_is_refused_before_it_flies(plan: dict[str, Any],
         return simulate(flight)
 
     with pytest.raises(InputError, match=said):
-        study(FlightPlan.model_validate(plan), 1e-3, never)
+        study(Scenario.model_validate(plan), 1e-3, never)
 
 
 def test_a_check_of_unknown_numbers_is_open() -> None:

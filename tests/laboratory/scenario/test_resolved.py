@@ -19,6 +19,7 @@ from space_robot.flight.bag_path import default_bag
 from space_robot.flight.plan import Flight
 from space_robot.flight.simulate import simulate
 from space_robot.scenario.node_settings import NODES, NOT_TO_BE_SET, SCHEMAS, FlightSettings
+from space_robot.scenario.scenario import Scenario
 from space_robot_msgs_py.bag.message_accounting import topics_with_allowed_gaps
 from space_robot_msgs_py.config.installation import GRAPH_FILE, config_directory
 from space_robot_msgs_py.config.settings import leaves
@@ -152,7 +153,7 @@ def test_a_resolved_scenario_needs_no_file_of_the_package(
     monkeypatch.setattr("space_robot_msgs_py.config.files.config_directory", lambda: tmp_path)
     monkeypatch.setattr("space_robot_msgs_py.config.settings.config_directory", lambda: tmp_path)
     with pytest.raises(InputError, match="unknown robot"):
-        FlightSettings.resolve({"plant": {"case": "2"}}, {})
+        FlightSettings.resolve(Scenario(case="2"))
     assert planned(**numbers).scenario.tree == numbers
 
 

@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 from strategies import State, random_quaternion, random_robot
 
 from space_robot.analysis.mission_plan import planned_segments
-from space_robot.flight.plan import Flight, FlightPlan, resolve
+from space_robot.flight.plan import Flight, Scenario, resolve
 from space_robot.tuning.demand import demand
 from space_robot.tuning.inertia import (
     SAMPLING,
@@ -38,7 +38,7 @@ def case(**parts: dict[str, float]) -> EnvironmentSettings:
 
 
 def mission() -> MissionSettings:
-    return Flight(resolve(FlightPlan(robot="paper"))).mission_settings
+    return Flight(resolve(Scenario(robot="paper"))).mission_settings
 
 
 def test_friction_is_asked_of_the_joints_by_their_rates(paper_robot: Robot) -> None:
@@ -131,7 +131,7 @@ def test_it_is_pinocchios(seed: int, n: int) -> None:
 
 
 def test_both_ends_of_a_mission_are_looked_at() -> None:
-    flight = Flight(resolve(FlightPlan(robot="seven_joint")))
+    flight = Flight(resolve(Scenario(robot="seven_joint")))
     found = inertia_along(flight.robot, flight.mission_settings, step=7.0)
     assert found.shape == (6, 10, 10)  # 0, 7, ... 28 and beyond the end at 30 s
     ends = np.radians(flight.mission_settings.joints_deg), flight.mission.pieces[-1].goal
@@ -161,7 +161,7 @@ def test_without_base_it_is_pinocchios_with_six_coordinates_eliminated(seed: int
 
 def test_loose_joints_give_way_and_locked_ones_do_not() -> None:
     """The accelerations of attitude and motors under their forces alone, from the whole inertia."""
-    flight = Flight(resolve(FlightPlan(robot=PASSIVE_ROBOT)))
+    flight = Flight(resolve(Scenario(robot=PASSIVE_ROBOT)))
     robot, rest = flight.robot, [spring.rest for spring in flight.robot.springs]
     theta = np.array([[0.3, 0.5, -0.8, 0.1, -0.4, 1.0], [-1.2, 1.1, 2.0, -0.7, 0.6, 0.2]])
     moved = range(3, 12)

@@ -23,7 +23,7 @@ from oracles.rotors import (
 from robots import REFLECTED
 from strategies import State, random_gears, random_robot, with_gears
 
-from space_robot.flight.plan import Flight, FlightPlan, resolve
+from space_robot.flight.plan import Flight, Scenario, resolve
 from space_robot.flight.simulate import simulate
 from space_robot.tuning.flexible import (
     FlexibleCheck,
@@ -115,7 +115,7 @@ def held_flight(
     ``base_rate``: of the base at the start about each axis, rad/s.
     """
     mission = {"joints_deg": POSTURE_DEG, "base_quaternion": quaternion.tolist()}
-    plan = FlightPlan(
+    plan = Scenario(
         controller=law,
         gains=dict(gains),
         robot=paper_robot,

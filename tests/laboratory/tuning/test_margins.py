@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from space_robot.cli.options import remarks_on
-from space_robot.flight.plan import Flight, FlightPlan, resolve
+from space_robot.flight.plan import Flight, Scenario, resolve
 from space_robot.flight.simulate import simulate
 from space_robot.tuning.closed_loop import RigidLoop, loop_of, rigid_motion
 from space_robot.tuning.gain_check import GainCheck, check_gains, noise_gain, pair_corner
@@ -36,7 +36,7 @@ SLOW = {"k_p": 1e-4, "k_d": 2e-2}
 
 @functools.cache
 def flight(case: str = "1", gains: str = "default") -> Flight:
-    return Flight(resolve(FlightPlan(case=case, gains=gains)))
+    return Flight(resolve(Scenario(case=case, gains=gains)))
 
 
 def slow_law(name: str, **gains: Array | float) -> ControlLaw:
@@ -107,7 +107,7 @@ def checked(law: str, gains: str) -> GainCheck:
 def fly(law: str, gains: str, **plant: float) -> float:
     """The largest error of any axis in case 1, with parameters of the plant."""
     parameters = {"plant": {name: [value] for name, value in plant.items()}}
-    plan = FlightPlan(controller=law, gains=gains, parameters=parameters)
+    plan = Scenario(controller=law, gains=gains, parameters=parameters)
     log = simulate(Flight(resolve(plan)))
     assert log.telemetry is not None
     return float(np.max(np.abs(log.telemetry[:, 3])))
@@ -174,7 +174,7 @@ def test_eigenvalues_are_scipys(seed: int, m: int) -> None:
 @pytest.mark.parametrize("is_nominal", [False, True])
 @pytest.mark.parametrize("share", [0.02, 0.2, 0.5])
 def test_the_sample_is_within_the_bound_and_scipys(share: float, is_nominal: bool) -> None:
-    flight = Flight(resolve(FlightPlan()))
+    flight = Flight(resolve(Scenario()))
     robot, mission = flight.plant.robot, flight.mission_settings
     inertia = inertia_along(robot, mission, 5.0)
     nominal = np.array([x.inertia for x in postures_along(flight.robot, mission, 5.0)])
@@ -194,7 +194,7 @@ def test_the_sample_is_within_the_bound_and_scipys(share: float, is_nominal: boo
         assert check.largest == pytest.approx(1.0 / (1.0 - share))
 
 
-def remarks(plan: FlightPlan, corner: float = 0.0) -> list[str]:
+def remarks(plan: Scenario, corner: float = 0.0) -> list[str]:
     flight = Flight(resolve(plan))
     laws = [flight.law, *(law for _, law in flight.swaps)]
     return margin_remarks(
@@ -207,16 +207,16 @@ def remarks(plan: FlightPlan, corner: float = 0.0) -> list[str]:
     )
 
 
-TOO_LARGE = FlightPlan(
+TOO_LARGE = Scenario(
     parameters={"controller": {"tde_stc.h_bar": [50.0] * 3 + [5.0] * 3 + [1.0] * 3}}
 )
 
 
 def test_table_iv_is_remarked_upon_once_a_law() -> None:
-    (line,) = remarks(FlightPlan(swaps=["1:tde_stc"]))
+    (line,) = remarks(Scenario(swaps=["1:tde_stc"]))
     assert line.startswith("warning: tde_stc: h_bar leaves 0.31% of margin in torque scale")
     assert line.endswith("see space-robot gains check")
-    both = remarks(FlightPlan(swaps=["1:tde_smc", "2:ctc"]))
+    both = remarks(Scenario(swaps=["1:tde_smc", "2:ctc"]))
     assert [text.split(":")[1] for text in both] == [" tde_stc", " tde_smc"]
 
 
@@ -224,13 +224,13 @@ def test_nobody_is_warned_of_the_default_gains_unless_the_flight_tries_their_mar
     """Who has chosen nothing is not greeted with a warning; who has tried something is."""
     h_bar = {"controller": {"tde_stc.h_bar": H_BAR}}
     for plan, count in (
-        (FlightPlan(), 0),
-        (FlightPlan(case="3", sensors="fine"), 0),
-        (FlightPlan(gains="printed"), 1),
-        (FlightPlan(parameters=h_bar), 1),
-        (FlightPlan(gains={"h_bar": H_BAR}), 1),
-        (FlightPlan(faults=["torque_scale@2:base=0.99"]), 1),
-        (FlightPlan(actuators="wheels"), 1),
+        (Scenario(), 0),
+        (Scenario(case="3", sensors="fine"), 0),
+        (Scenario(gains="printed"), 1),
+        (Scenario(parameters=h_bar), 1),
+        (Scenario(gains={"h_bar": H_BAR}), 1),
+        (Scenario(faults=["torque_scale@2:base=0.99"]), 1),
+        (Scenario(actuators="wheels"), 1),
     ):
         assert len(remarks_on(Flight(resolve(plan)))) == count, plan
     (line,) = remarks_on(Flight(resolve(TOO_LARGE)))
@@ -241,9 +241,9 @@ def test_nobody_is_warned_of_the_default_gains_unless_the_flight_tries_their_mar
 
 def test_thrusters_are_told_which_gains_are_for_them() -> None:
     for actuators, is_said in (("thrusters", True), ("wheels_and_thrusters", False)):
-        (line,) = remarks_on(Flight(resolve(FlightPlan(actuators=actuators))))
+        (line,) = remarks_on(Flight(resolve(Scenario(actuators=actuators))))
         assert ("thrusters' pulses" in line) is is_said
-    assert remarks_on(Flight(resolve(FlightPlan(actuators="thrusters", gains="robust")))) == []
+    assert remarks_on(Flight(resolve(Scenario(actuators="thrusters", gains="robust")))) == []
 
 
 @pytest.mark.parametrize(
@@ -268,7 +268,7 @@ def test_an_observer_of_too_little_inertia_is_remarked_upon(inertia: float, word
     """Of ADRC by its loop: its observer's pole is at ``min(lambda) omega_o / 3``."""
     shape = [5.3, 2.8, 2.2, 0.067, 0.23, 0.19, 0.0053, 0.0056, 0.0012]
     own = {"inertia": [inertia * value for value in shape], "omega_c": [0.2], "omega_o": [400.0]}
-    plan = FlightPlan(
+    plan = Scenario(
         controller="adrc", parameters={"controller": {f"adrc.{k}": v for k, v in own.items()}}
     )
     found = remarks(plan)
@@ -284,7 +284,7 @@ DIAGONAL = np.array(H_BAR)
 
 @functools.cache
 def posture(controls_base: bool = True) -> Posture:
-    robot = Flight(resolve(FlightPlan())).robot
+    robot = Flight(resolve(Scenario())).robot
     (only,) = postures_at(robot, [JOINTS], controls_base)
     return only
 

@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from space_robot.flight.plan import Flight, FlightPlan, resolve
+from space_robot.flight.plan import Flight, Scenario, resolve
 from space_robot.tuning.demand import ForceDemand, demand
 from space_robot.tuning.equal_ripple import LINEAR_SHARE
 from space_robot.tuning.held_ripple import law_ripple
@@ -31,7 +31,7 @@ PERIOD = 5e-4
 @functools.cache
 def scene(robot: str = "paper") -> tuple[Array, list[Posture], ForceDemand]:
     """H_S with the least and the largest payload, nominal postures, and what is asked for."""
-    flights = [Flight(resolve(FlightPlan(robot=robot, case=case))) for case in ("1", "4-2")]
+    flights = [Flight(resolve(Scenario(robot=robot, case=case))) for case in ("1", "4-2")]
     first = flights[0]
     inertias = [inertia_along(x.plant.robot, first.mission_settings) for x in flights]
     cases = [x.plant_settings for x in flights]
@@ -191,7 +191,7 @@ def test_axes_that_nothing_is_asked_of_have_gains_as_well() -> None:
 @functools.cache
 def heard(sensors: str, navigation: Any = "direct", corner: float = 100.0) -> Noise:
     own = {"navigation_filter.rate_filter_hz": corner, "navigation_filter.joint_bandwidth_hz": 0.0}
-    plan = FlightPlan(
+    plan = Scenario(
         sensors=sensors, navigation=navigation, case="3", parameters={"controller": own}
     )
     flight = Flight(resolve(plan))

@@ -25,7 +25,7 @@ from scene_pages import (
 )
 from scipy.spatial.transform import Rotation
 
-from space_robot.flight.plan import FlightPlan, resolve
+from space_robot.flight.plan import Scenario, resolve
 from space_robot.view.arrows import turns_from_z
 from space_robot.view.base_surface import clearest_side
 from space_robot.view.earth import ON_DARK_PAGE, Shades, earth_glb
@@ -385,7 +385,7 @@ def test_in_orbit_the_camera_sees_every_point_and_the_earth_below(
 @pytest.mark.parametrize(("name", "side"), [("paper", 1.0), ("canadarm", -1.0), ("canadarm2", 1.0)])
 def test_the_base_does_not_hide_the_arm(name: str, side: float) -> None:
     """It is on the other side of the Orbiter's z axis."""
-    scenario = resolve(FlightPlan(robot=name, controller="ctc"))
+    scenario = resolve(Scenario(robot=name, controller="ctc"))
     robot, start = scenario.robots.plant, np.radians(scenario.settings.mission.joints_deg)
     poses = np.array([start, *(piece.goal for piece in scenario.reference.pieces)])
     found = clearest_side([(robot, np.tile([1.0, 0.0, 0.0, 0.0], (len(poses), 1)), poses)])

@@ -15,7 +15,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from paths import CONFIG, DATA
 
-from space_robot.flight.plan import Flight, FlightPlan, resolve
+from space_robot.flight.plan import Flight, Scenario, resolve
 from space_robot_control.controller.settings import ControllerNodeSettings, gain_files, set_file
 from space_robot_control.laws import laws
 from space_robot_model.robot.find import (
@@ -91,7 +91,7 @@ def test_a_folder_is_a_robot(folder: Path, name: str, monkeypatch: pytest.Monkey
     assert found.name == "mine"
     assert mission_layers(name, "")[0].samefile(folder / "mission.yaml")
     assert gain_files(name, "default")["ctc"].samefile(folder / "gains/tuned/ctc.yaml")
-    assert Flight(resolve(FlightPlan(robot=name, duration=0.1))).description["mission"] == "mine"
+    assert Flight(resolve(Scenario(robot=name, duration=0.1))).description["mission"] == "mine"
 
 
 def test_a_folder_is_known_by_its_bare_name_on_the_command_line_alone(
@@ -99,7 +99,7 @@ def test_a_folder_is_known_by_its_bare_name_on_the_command_line_alone(
 ) -> None:
     monkeypatch.chdir(folder.parent)
     assert robot_as_path("mine") == "mine/"
-    assert Flight(resolve(FlightPlan(robot="mine", duration=0.1))).robot.n == 7
+    assert Flight(resolve(Scenario(robot="mine", duration=0.1))).robot.n == 7
     with pytest.raises(InputError, match=r"unknown robot 'mine': choose one of .*paper"):
         find_robot("mine")
     (folder.parent / "paper").mkdir()
@@ -111,7 +111,7 @@ def test_what_is_not_there_is_said_in_one_line(
 ) -> None:
     shutil.copy(folder / "robot.yaml", tmp_path / "arm.yaml")
     with pytest.raises(InputError, match=r"no mission of its own: `space-robot new .*arm.yaml`"):
-        Flight(resolve(FlightPlan(robot=str(tmp_path / "arm.yaml"))))
+        Flight(resolve(Scenario(robot=str(tmp_path / "arm.yaml"))))
     with pytest.raises(InputError, match=r"no gains of its own: `space-robot new .*arm.yaml`"):
         gain_files(str(tmp_path / "arm.yaml"), "default")
     with pytest.raises(InputError, match=r"no such file or folder"):

@@ -11,7 +11,7 @@ import pytest
 from space_robot.analysis import analyze
 from space_robot.analysis.estimate_error import HBar, errors_of, recorded_h_bar
 from space_robot.analysis.excerpt import excerpt
-from space_robot.flight.plan import Flight, FlightPlan, resolve
+from space_robot.flight.plan import Flight, Scenario, resolve
 from space_robot.flight.replay.run import RecordedLaws
 from space_robot.flight.simulate import simulate
 from space_robot_msgs_py.bag.flight_log import REFERENCE, FlightLog
@@ -22,7 +22,7 @@ from space_robot_msgs_py.samples import STATE_FIELDS, LawInForce, Timebase, in_o
 COLUMNS = (*STATE_FIELDS, *REFERENCE, "commanded_torque")
 
 
-PLAN = FlightPlan.model_validate(
+PLAN = Scenario.model_validate(
     {
         "duration": 0.3,
         "case": "3",
@@ -130,7 +130,7 @@ def test_laws_are_put_in_force_before_their_states(states: list[int], done: list
 @pytest.fixture(scope="module")
 def swapped() -> FlightLog:
     """TDE-STC, then CTC, then TDE-SMC, whose h_bar is halved in the record."""
-    return simulate(Flight(resolve(FlightPlan(duration=0.3, swaps=["0.1:ctc", "0.2:tde_smc"]))))
+    return simulate(Flight(resolve(Scenario(duration=0.3, swaps=["0.1:ctc", "0.2:tde_smc"]))))
 
 
 def test_the_report_has_all_laws_that_flew(swapped: FlightLog) -> None:

@@ -19,7 +19,7 @@ from space_robot.analysis.report_tables import metrics_table, rms_table
 from space_robot.cli.report_display import print_comparison
 from space_robot.console.terminal import terminal
 from space_robot.console.terminal_tables import print_table
-from space_robot.flight.plan import Flight, FlightPlan, resolve
+from space_robot.flight.plan import Flight, Scenario, resolve
 from space_robot.flight.replay.choice import ControllerChoice
 from space_robot.flight.replay.recording import Recording
 from space_robot.flight.simulate import simulate
@@ -33,7 +33,7 @@ from space_robot_msgs_py.samples import Timebase
 fuzzed = settings(max_examples=25, suppress_health_check=list(HealthCheck))
 MODULE = "this"
 """Importing it prints, and it is in no one's way."""
-PLAN = FlightPlan(duration=0.02, swaps=["0.005:ctc"], case="3", actuators="wheels")
+PLAN = Scenario(duration=0.02, swaps=["0.005:ctc"], case="3", actuators="wheels")
 DESCRIPTION = json.dumps(Flight(resolve(PLAN)).description)
 TEXTS = (
     *(r"$\frac$", "[/red]", "$", ":smile:", "<b>&amp;", "[bold]", "\\", "{}", "%s", "夏"),

@@ -13,7 +13,7 @@ from bags import FLIGHT, TIMEBASE, Recorded, messages_of, read_accounts, record
 
 from space_robot.analysis import analyze
 from space_robot.analysis.words import of_statistic
-from space_robot.flight.plan import Flight, FlightPlan, resolve
+from space_robot.flight.plan import Flight, Scenario, resolve
 from space_robot.flight.simulate import simulate
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.bag.flight_log import REFERENCE, FlightLog
@@ -149,13 +149,13 @@ FAULTS = [*NOISE, "torque_scale@0.05:joints=0.998"]
 @pytest.fixture(scope="module")
 def flown(tmp_path_factory: pytest.TempPathFactory) -> tuple[FlightLog, Path]:
     bag = tmp_path_factory.mktemp("truth") / "bag"
-    plan = FlightPlan(faults=FAULTS, duration=0.2, case="2")
+    plan = Scenario(faults=FAULTS, duration=0.2, case="2")
     return simulate(Flight(resolve(plan)), bag), bag
 
 
 def recorded_anew(bag: Path, folder: Path, keep: Callable[[topics.Topic, int], bool]) -> FlightLog:
     """The flight of some of a bag's messages, by topic and stamp in ticks."""
-    flight = Flight(resolve(FlightPlan(faults=FAULTS, duration=0.2, case="2")))
+    flight = Flight(resolve(Scenario(faults=FAULTS, duration=0.2, case="2")))
     recorder = BagRecorder(folder, flight.description, flight.timebase)
     for topic, data in messages_of(bag):
         if not topic.has_stamp or keep(topic, header_stamp_ns(data) // TIMEBASE.period_ns):
@@ -166,7 +166,7 @@ def recorded_anew(bag: Path, folder: Path, keep: Callable[[topics.Topic, int], b
 
 def test_sensors_that_tell_the_truth_need_no_second_word(tmp_path: Path) -> None:
     """Nor is a bag without it incomplete."""
-    log = simulate(Flight(resolve(FlightPlan(duration=0.02))), tmp_path / "bag")
+    log = simulate(Flight(resolve(Scenario(duration=0.02))), tmp_path / "bag")
     recorded = read_flight(tmp_path / "bag")
     for one in (log, recorded):
         assert one.measured is None

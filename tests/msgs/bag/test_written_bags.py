@@ -17,7 +17,7 @@ from rosbags.rosbag2 import Reader
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from rosbags.typesys.store import Typestore
 
-from space_robot.flight.plan import Flight, FlightPlan, resolve
+from space_robot.flight.plan import Flight, Scenario, resolve
 from space_robot.flight.simulate import simulate
 from space_robot_model.robot import Robot
 from space_robot_msgs_py import topics
@@ -95,7 +95,7 @@ FLIGHTS: dict[str, tuple[dict[str, Any], set[topics.Topic]]] = {
 def bag(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("bags") / request.param
     options = {"duration": 0.1, "sensors": "fine", **FLIGHTS[request.param][0]}
-    simulate(Flight(resolve(FlightPlan.model_validate(options))), folder)
+    simulate(Flight(resolve(Scenario.model_validate(options))), folder)
     return folder
 
 
@@ -130,7 +130,7 @@ def test_every_message_serialised_again_is_the_same_bytes(bag: Path) -> None:
 @pytest.fixture(scope="module")
 def plain(tmp_path_factory: pytest.TempPathFactory) -> Path:
     bag = tmp_path_factory.mktemp("plain") / "bag"
-    simulate(Flight(resolve(FlightPlan(duration=0.3))), bag)
+    simulate(Flight(resolve(Scenario(duration=0.3))), bag)
     return bag
 
 
@@ -153,7 +153,7 @@ def test_compressions_hold_the_same_messages_in_less_room(plain: Path, tmp_path:
     sizes = {}
     for compression in get_args(Compression):
         bag = tmp_path / compression
-        simulate(Flight(resolve(FlightPlan(duration=0.3, compression=compression))), bag)
+        simulate(Flight(resolve(Scenario(duration=0.3, compression=compression))), bag)
         assert _read(bag) == _read(plain)
         with Reader(bag) as reader:
             assert [bytes(raw) for *_, raw in reader.messages()] == [
@@ -272,14 +272,14 @@ def test_a_bag_is_never_overwritten_and_of_two_recorders_the_first_has_it(tmp_pa
 )
 def test_bad_options_are_named(parameter: str, value: object, said: str) -> None:
     with pytest.raises(InputError, match=said):
-        Flight(resolve(FlightPlan(parameters={"recorder": {parameter: value}})))
+        Flight(resolve(Scenario(parameters={"recorder": {parameter: value}})))
 
 
 @pytest.mark.parametrize(
     ("given", "size"), [("500K", 500_000), ("100M", 10**8), ("2G", 2 * 10**9), ("1MiB", 2**20)]
 )
 def test_sizes_as_people_write_them(given: str, size: int) -> None:
-    plan = FlightPlan.model_validate({"split_size": given})
+    plan = Scenario.model_validate({"split_size": given})
     assert Flight(resolve(plan)).scenario.recorder.split_size == size
 
 

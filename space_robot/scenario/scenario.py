@@ -1,42 +1,33 @@
-"""Scenarios: the definition of a flight, and methods to fly it."""
+"""A scenario: the options of a flight as names, paths or objects, and methods to fly it."""
 
 from __future__ import annotations
 
 import warnings
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from pydantic import ValidationError
+from pydantic import ValidationError, ValidationInfo, field_validator
 from typing_extensions import Self
 
 from space_robot_msgs_py.config.arguments import as_path
-from space_robot_msgs_py.config.validation import one_line, one_of, short
-from space_robot_msgs_py.errors import InputError
+from space_robot_msgs_py.config.text import html_table
+from space_robot_msgs_py.config.validation import StrictModel, one_line, one_of, short
+from space_robot_msgs_py.errors import InputError, explained_by
 
-from ..console.progress import check_progress
-from ..flight.compilation import compile_kernels
-from ..flight.plan import Flight, resolve
-from ..scenario.options import FlightPlan
-from .bench import Bench
-from .flown_flight import FlownFlight
-from .in_process import fly_with_progress
-from .options_html import options_html
+from .options import OPTIONS, Options
 
-OF_THE_GRAPH = (
-    "realtime",
-    "fifo_priority",
-    "without",
-    "join_timeout",
-    "restart_controller",
-    "composed",
-    "domain",
-    "namespace",
-)
-"""Options of `FlightPlan` for graphs of nodes only, as in `space-robot fly`."""
+if TYPE_CHECKING:
+    from space_robot_sim.faults.grammar import Kinds
+
+    from ..api.bench import Bench
+    from ..api.flown_flight import FlownFlight
+    from ..flight.plan import Flight
+
+NO_FRICTION = {"friction.coulomb": 0.0, "friction.viscous": 0.0}
 
 
-class Scenario(FlightPlan):
+class Scenario(StrictModel, Options):
     """Definition of a flight: the options of ``space-robot simulate``, with the same defaults.
 
         Scenario(robot="paper", controller="tde_stc", case="3", sensors="fine", seed=1)
@@ -46,20 +37,23 @@ class Scenario(FlightPlan):
     - ``robot``: a `Robot`, with the mission and gains of the shipped robot of the same name, if
       any; or the mapping of its file
     - ``plant_robot``: the robot of the plant, if it differs from that of controller and mission
-    - ``controller``: a `ControlLaw` class or object; None: none, for `bench`
+    - ``controller``: a `ControlLaw` class or object; a function, see
+      `space_robot_control.controller.law_choice`; None: none, for `bench`
     - ``gains``: values by gain, in place of the default set's: ``{"k_1": 3.0, "h_bar": [...]}``,
       one for all axes or n+3 (base x, y, z, joints); or such a mapping for each of several laws
     - ``mission``: a mission's document, ``{"start": ..., "segments": [...]}``, or
       `MissionSettings`; also ``initial_joints_deg``, ``initial_quaternion`` and
       ``initial_rate_deg_s`` (default: the mission's start)
-    - ``case``, ``sensors``, ``actuators``: their settings, objects or mappings
+    - ``disturbance``: columns, numbers by name; or a function of time, sampled at 100 Hz
+    - ``case``, ``sensors``, ``actuators``, ``orbit``: their settings, objects or mappings
     - ``assumed_actuators``: the base's actuators as assumed by the flight software
     - ``parameters``: any parameter of a node, ``{"plant": {"friction.coulomb": 0.0}}``
 
     The other options: ``duration`` s, ``period`` s, ``substeps``, ``navigation`` ("direct" or
     "filtered"), ``command_latency_ticks``, ``friction`` (False: none), ``faults``, ``events`` and
-    ``swaps`` (lists of texts), ``seed``, ``compression`` and ``split_size`` of a bag. A scenario is
-    immutable and can be pickled; `replace` returns a modified one.
+    ``swaps`` (lists of texts), ``seed``, ``compression`` and ``split_size`` of a bag; and those of
+    ``space-robot fly``, which no flight in this process can have. A scenario is immutable and can
+    be pickled; `replace` returns a modified one.
     """
 
     def __init__(self, **options: Any) -> None:
@@ -68,13 +62,24 @@ class Scenario(FlightPlan):
         Raises:
             InputError: (a ValueError) an unknown option, or one of a wrong type.
         """
-        allowed = [name for name in FlightPlan.model_fields if name not in OF_THE_GRAPH]
         for name in options:
-            one_of(name, allowed, "option", " of Scenario")
+            one_of(name, type(self).model_fields, "option", " of Scenario")
         try:
             super().__init__(**options)
         except ValidationError as error:
             raise InputError(one_line(error, type(self), "Scenario")) from None
+
+    # `model_validate` needs Pydantic's own error, to which it adds the name of a file
+    __init__.__pydantic_base_init__ = True  # type: ignore[attr-defined]
+
+    @field_validator("*", mode="before")
+    @classmethod
+    def _convert(cls, value: Any, field: ValidationInfo) -> Any:
+        from .objects import CONVERTERS
+
+        name = str(field.field_name)
+        is_absent = value is None and cls.model_fields[name].default is None
+        return value if is_absent or name not in CONVERTERS else CONVERTERS[name](value)
 
     def replace(self, **options: Any) -> Self:
         """Return a copy of the scenario with these options changed.
@@ -86,8 +91,37 @@ class Scenario(FlightPlan):
 
     @property
     def given(self) -> dict[str, Any]:
-        """The options that differ from their defaults, by name."""
+        """The options that were set, by name."""
         return {name: getattr(self, name) for name in sorted(self.model_fields_set)}
+
+    @property
+    def has_chosen_law(self) -> bool:
+        """Whether the user set the law."""
+        own = self.parameters.get("controller", {})
+        return "controller" in self.model_fields_set or "controller" in own
+
+    @property
+    def graph_options(self) -> list[str]:
+        """The options that were set, and that only a graph of nodes can fulfil."""
+        return [
+            name
+            for name, option in OPTIONS.items()
+            if option.needs_graph and getattr(self, name) != option.default
+        ]
+
+    @explained_by("disturbances")
+    def faults_of(self, kinds: Kinds) -> list[str]:
+        """Return the texts of the faults of the given ``kinds``."""
+        from space_robot_sim.faults.grammar import parse_faults
+
+        from .faults import KINDS
+
+        return [str(f) for f in parse_faults(self.faults, KINDS) if f.kind.name in kinds]
+
+    def with_parameters(self, node: str, values: dict[str, Any]) -> Self:
+        """Return the same scenario with further parameters of a node, by dotted name."""
+        parameters = {**self.parameters, node: {**self.parameters.get(node, {}), **values}}
+        return self.model_copy(update={"parameters": parameters})
 
     def check(self) -> Flight:
         """Resolve all names, and return the flight that would be flown.
@@ -95,6 +129,8 @@ class Scenario(FlightPlan):
         Raises:
             InputError: something does not exist, or does not fit the rest; in one line.
         """
+        from ..flight.plan import Flight, resolve
+
         flight = Flight(resolve(self))
         flight.check_in_process()
         return flight
@@ -133,6 +169,9 @@ class Scenario(FlightPlan):
         Raises:
             InputError: see `check`; or the bag cannot be created, or there is no room for a log.
         """
+        from ..api.in_process import fly_with_progress
+        from ..console.progress import check_progress
+
         if self.controller is None:
             raise InputError("controller is None, so there is nothing to fly: use bench()")
         check_progress(progress)
@@ -151,16 +190,40 @@ class Scenario(FlightPlan):
         Raises:
             InputError: see `check`.
         """
+        from ..api.bench import Bench
+        from ..flight.compilation import compile_kernels
+
         flight = self.check()
         compile_kernels(bool(flight.plant.names.actuators))
         return Bench(flight, record)
 
     def _repr_html_(self) -> str:
-        """Show the options that differ from their defaults in a notebook."""
-        return options_html(self.given)
+        """Show the options that were set in a notebook."""
+        rows = [[name, _text(value), _default(name)] for name, value in self.given.items()]
+        caption = "Scenario" if rows else "Scenario: all options have their defaults"
+        return html_table(("option", "value", "default"), rows, caption)
 
     def __repr__(self) -> str:
         said = ", ".join(f"{name}={short(value)}" for name, value in self.given.items())
         return f"Scenario({said})"
 
     __str__ = __repr__
+
+
+for _name, _option in OPTIONS.items():  # an error of a number shows it, as it has the unit
+    Scenario.model_fields[_name].description = _option.help_text
+
+
+def _text(value: object) -> str:
+    """Return a value as text: of a robot or a law its name."""
+    if isinstance(value, str):
+        return value
+    name = getattr(value, "name", None) or getattr(value, "__name__", None)
+    return name if isinstance(name, str) else short(value)
+
+
+def _default(name: str) -> str:
+    if name not in OPTIONS:
+        return "none"
+    option = OPTIONS[name]
+    return option.default_text or ("none" if option.default is None else str(option.default))
