@@ -7,6 +7,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from rich.console import Console
 from typing_extensions import Self
 
 from space_robot_msgs_py.bag.flight_log import FlightLog
@@ -19,7 +20,6 @@ from ..analysis import analyze
 from ..analysis.own_metric import MetricFunction, finite_value
 from ..analysis.report_tables import rms_table
 from ..analysis.words import flown
-from ..console.notebook import is_in_notebook
 from ..flight.bag_path import check_bag_path
 from ..flight.ending import COMPLETE, Ending
 from ..flight.flight_messages import record
@@ -232,7 +232,7 @@ class FlownFlight:
         options = ViewOptions(side_by_side, rate, title, not light, kinds)
         logs, robots = zip(*((flight.log, flight.flight.robot) for flight in flights), strict=True)
         page = FlightPage(draw_page(logs, robots, options), height)
-        if is_in_notebook():
+        if Console().is_jupyter:
             if path is not None:
                 page.save(path)
         else:

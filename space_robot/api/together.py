@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable, Iterable, Iterator
+from functools import partial
 
 from space_robot_msgs_py.config.validation import short
 from space_robot_msgs_py.errors import InputError
 
-from ..console.progress import check_progress, flights_progress
+from ..console.progress import check_progress, rated_progress
 from ..flight.batch.batch import FlightBatch
 from ..flight.batch.benches import Benches
 from ..flight.batch.compilation import compile_lanes
@@ -47,8 +48,9 @@ def fly_many(
     check_progress(progress)
     if progress is True:
         several = list(_several(scenarios))
-        with flights_progress(len(several)) as show:
-            return _fly_groups(several, keep_log, show, is_shown_at_start=True)
+        with rated_progress("flights") as show:
+            shown = partial(show, total=len(several))
+            return _fly_groups(several, keep_log, shown, is_shown_at_start=True)
     return _fly_groups(scenarios, keep_log, progress or None)
 
 

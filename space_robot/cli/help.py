@@ -2,14 +2,35 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import click
 
 SECTION = "Begin"
 
+FOLDER = Path(__file__).parents[1] / "help"
+"""With a Markdown file for each topic."""
+ORDER = (
+    "first-flight",
+    "results",
+    "own-robot",
+    "own-trajectory",
+    "own-law",
+    "gains",
+    "sensors",
+    "disturbances",
+    "campaign",
+    "ros",
+    "realtime",
+    "install",
+)
+"""The topics as they are listed: a new user's path."""
+
 
 @click.command()
 @click.argument("topic", default="")
-def help(topic: str) -> None:
+@click.pass_context
+def help(context: click.Context, topic: str) -> None:
     """Show the answer to a question of new users, with commands to try; without TOPIC, list all.
 
     TOPIC may also be a command, whose --help is shown.
@@ -20,28 +41,32 @@ def help(topic: str) -> None:
       space-robot help own-robot
       space-robot help simulate
     """
-    from ..help.topics import ORDER, as_plain_text, read_topic, title
-
-    context = click.get_current_context()
-    commands = _commands(context)
+    group = context.find_root().command
+    command = group.get_command(context, topic) if isinstance(group, click.Group) else None
     if not topic:
         width = max(map(len, ORDER))
         for name in ORDER:
-            click.echo(f"{name:{width}}  {title(read_topic(name))}")
+            click.echo(f"{name:{width}}  {read_topic(name)[0]}")
         click.echo(
             "\nspace-robot help TOPIC shows one of them, space-robot COMMAND --help a command."
         )
-    elif topic in commands and topic not in ORDER:
-        command = commands[topic]
+    elif command and not command.hidden and topic not in ORDER:
         with click.Context(command, info_name=topic, parent=context.parent) as own:
             click.echo(command.get_help(own))
     else:
-        heading, _, rest = as_plain_text(read_topic(topic)).partition("\n")
-        click.echo(f"{click.style(heading, bold=True)}\n{rest}")
+        from space_robot_msgs_py.config.validation import one_of
+
+        heading, *lines = read_topic(one_of(topic, ORDER, "topic"))
+        click.echo("\n".join([click.style(heading, bold=True), *lines]))
 
 
-def _commands(context: click.Context) -> dict[str, click.Command]:
-    """Return the visible commands by name."""
-    group = context.find_root().command
-    commands = group.commands if isinstance(group, click.Group) else {}
-    return {name: command for name, command in commands.items() if not command.hidden}
+def read_topic(name: str) -> list[str]:
+    """Return the lines of a topic: its question, and the answer with indented commands."""
+    question, *lines = (FOLDER / f"{name}.md").read_text("utf-8").rstrip().split("\n")
+    texts, is_fenced = [question.removeprefix("# ")], False
+    for line in lines:
+        if line.startswith("```"):
+            is_fenced = not is_fenced
+        else:
+            texts.append(f"    {line}" if is_fenced and line else line)
+    return texts

@@ -4,24 +4,66 @@ from __future__ import annotations
 
 import atexit
 import gc
+import io
+import os
 import pkgutil
+import re
 import sys
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from importlib import import_module
 from typing import NoReturn
 
 import click
 
-from space_robot_msgs_py.config.text import printable
+from space_robot_msgs_py.config.text import choices, printable
 from space_robot_msgs_py.errors import SpaceRobotError
 from space_robot_msgs_py.ros.process import hold_to_standard_input
 
-from ..console.streams import is_of_output, standard_streams
 from ..processes.interruption import Interrupted, raising_signals
 from ..processes.memory import COLLECTED_AT
 from ..processes.node_modules import MODULES, SUFFIX
-from .error_lines import error_line, usage_line
-from .sections import SectionedGroup
+
+_NO_COMMAND = re.compile(r"No such command '(.*?)'")
+_EXTRA = re.compile(r"Got unexpected extra arguments? \((.*)\)")
+_NO_NUMBER = re.compile(r"(.*) is not a valid (float|integer)( range)?\.")
+_NO_CHOICE = re.compile(r"(.*) is not one of .*\.")
+_KINDS = {"float": "a number", "integer": "a whole number"}
+_HELP_TOPICS = {"campaign": "campaign", "gains": "gains", "plan": "own-trajectory"}
+"""Topics of commands, for errors without a topic of their own."""
+SECTIONS = (
+    "Begin",
+    "Fly",
+    "Robots, missions and own pieces",
+    "Results",
+    "Gains and studies",
+    "Flight code",
+)
+"""Headings, in order; the module of each command has one of them as ``SECTION``."""
+LONGEST_HELP = 200
+"""Characters of a command's first sentence, which is wrapped and not cut."""
+
+
+class SectionedGroup(click.Group):
+    """A group whose help lists its commands by `SECTIONS`, each with its first sentence."""
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """Write a section for each heading that has commands."""
+        rows: dict[str, list[tuple[str, str]]] = {heading: [] for heading in SECTIONS}
+        for name in self.list_commands(ctx):
+            command = self.get_command(ctx, name)
+            if command is not None and not command.hidden:
+                rows[section_of(command)].append((name, command.get_short_help_str(LONGEST_HELP)))
+        for heading, commands in rows.items():
+            if commands:
+                with formatter.section(heading):
+                    formatter.write_dl(commands)
+
+
+def section_of(command: click.Command) -> str:
+    """Return the heading under which a command is listed."""
+    heading: str = vars(sys.modules[command.callback.__module__])["SECTION"]
+    return heading
 
 
 def _show_version(context: click.Context, option: click.Parameter, is_asked: bool) -> None:
@@ -91,24 +133,23 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
         del sys.argv[1]  # rclpy and the node read the rest
         import_module(module).main()
     if arguments is None:
-        _keep_what_is_loaded()
+        _relax_garbage_collection()
     hold_to_standard_input()  # if another command of this project has started this one
-    with raising_signals(), standard_streams():
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")
+    with raising_signals():
         code = _run(arguments)
     sys.exit(code)
 
 
-def _keep_what_is_loaded() -> None:
-    """Have the collector look seldom through what is imported, and not at all at the end.
-
-    Nothing of it is ever let go, and to look takes a fifth of a short command's time.
-    """
+def _relax_garbage_collection() -> None:
+    # what is imported is never freed, and to search it takes a fifth of a short command's time
     gc.set_threshold(COLLECTED_AT)
     atexit.register(gc.freeze)
 
 
 def _node_module(word: str) -> str | None:
-    """Return the module of the node with this name, or None."""
     return MODULES.get(word.removesuffix(SUFFIX)) if word.endswith(SUFFIX) else None
 
 
@@ -122,29 +163,76 @@ def _run(arguments: Sequence[str] | None) -> int:
         click.echo(f"space-robot: {interrupted}", err=True)
         return interrupted.exit_code if isinstance(interrupted, Interrupted) else 130
     except click.ClickException as error:
-        _complain(usage_line(error))
+        _print_error(_usage_line(error))
         return 2
     except SpaceRobotError as error:
         words = sys.argv[1:] if arguments is None else arguments
-        _complain(error_line(error, words[0] if words else ""))
+        _print_error(_error_line(error, words[0] if words else ""))
         return error.exit_code
     except OSError as error:
-        return _lost(error)
+        return _report_os_error(error)
     return code if isinstance(code, int) else 0
 
 
-def _lost(error: OSError) -> int:
+def _report_os_error(error: OSError) -> int:
     """Report a failed read or write, unless the pipe is closed; return the exit code."""
-    if not is_of_output(error):
-        _complain(f"{error.filename or 'the system'}: {error.strerror or error}")
-    elif not isinstance(error, BrokenPipeError):
-        _complain(f"standard output cannot be written ({error.strerror or error})")
+    if error.filename is None:
+        with suppress(OSError, ValueError):  # the interpreter flushes its output at the end
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    if not isinstance(error, BrokenPipeError):
+        _print_error(f"{error.filename or 'standard output'}: {error.strerror or error}")
     return 1
 
 
-def _complain(text: str) -> None:
+def _print_error(text: str) -> None:
     lines = (printable(line) for line in text.split("\n"))
     click.echo("space-robot: error: " + "\n".join(lines), err=True)
+
+
+def _error_line(error: SpaceRobotError, command: str) -> str:
+    text = str(error)
+    topic = error.help_topic or ("install" if "pip install " in text else "")
+    topic = topic or _HELP_TOPICS.get(command, "")
+    return f"{text} (see: space-robot help {topic})" if topic else text
+
+
+def _usage_line(error: click.ClickException) -> str:
+    context = error.ctx if isinstance(error, click.UsageError) else None
+    text = _reworded(error, context)
+    return f"{text} (see: {context.command_path} --help)" if context else text
+
+
+def _reworded(error: click.ClickException, context: click.Context | None) -> str:
+    if isinstance(error, click.NoSuchOption) and context:
+        names = [name for item in context.command.params for name in item.opts]
+        return f"no such option {error.option_name}: {choices(error.option_name, names)}"
+    if isinstance(error, click.BadParameter) and not isinstance(error, click.MissingParameter):
+        return _value_error(error)
+    text = error.format_message()
+    if (command := _NO_COMMAND.match(text)) and context:
+        group = context.command
+        commands = group.commands if isinstance(group, click.Group) else {}
+        names = [name for name, item in commands.items() if not item.hidden]
+        return f"no such command {command[1]!r}: {choices(command[1], names)}"
+    if extra := _EXTRA.match(text):
+        return f"unexpected argument {extra[1]!r}"
+    return text[:1].lower() + text[1:].removesuffix(".")
+
+
+def _value_error(error: click.BadParameter) -> str:
+    option, text = error.param, " ".join(error.message.split())
+    kind = option.type if option else None
+    if number := _NO_NUMBER.fullmatch(text):
+        purpose = getattr(option, "help", None)
+        about = f"; it is: {' '.join(purpose.split()).removesuffix('.')}" if purpose else ""
+        text = f"{_KINDS[number[2]]} was expected, got {number[1]}{about}"
+    elif (choice := _NO_CHOICE.fullmatch(text)) and isinstance(kind, click.Choice):
+        names = choices(choice[1].strip("'"), [str(name) for name in kind.choices])
+        text = f"unknown value {choice[1]}: {names}"
+    name = option.opts[0] if isinstance(option, click.Option) else error.param_hint
+    if name is None and option:
+        name = option.human_readable_name
+    return f"{name}: {text.removesuffix('.')}" if name else text.removesuffix(".")
 
 
 if __name__ == "__main__":

@@ -55,20 +55,16 @@ def check_writable(path: Path) -> None:
     Raises:
         InputError: it cannot be written.
     """
-    with _told(path):
+    with _written(path):
         if path.exists():
             path.open("r+b", buffering=0).close()  # fails for a folder, or without permission
         with TemporaryFile(dir=path.parent):  # no file remains if the caller fails
             pass
 
 
-def write_text(text: str, path: Path) -> None:
-    """Write ``text`` in UTF-8.
-
-    Raises:
-        InputError: the file exists or cannot be written.
-    """
-    with whole_file(path) as file:
+def write_text(text: str, path: Path, replace: bool = False) -> None:
+    """Write ``text`` in UTF-8, as a `whole_file`."""
+    with whole_file(path, replace) as file:
         file.write(text.encode())
 
 
@@ -103,12 +99,12 @@ def whole_file(path: Path, replace: bool = False) -> Iterator[IO[Any]]:
         InputError: the file exists, or it cannot be written.
     """
     if path.exists() and not path.is_file() and not path.is_dir():
-        with _told(path), path.open("wb") as file:
+        with _written(path), path.open("wb") as file:
             yield file
         return
     if not replace:
         check_free(path)
-    with _told(path):
+    with _written(path):
         unnamed = unfinished_name(path)
         try:
             with unnamed.open("xb") as file:
@@ -118,8 +114,7 @@ def whole_file(path: Path, replace: bool = False) -> Iterator[IO[Any]]:
             else:
                 os.link(unnamed, path)  # rename would overwrite a file
         finally:
-            with suppress(OSError):
-                unnamed.unlink()
+            unnamed.unlink(missing_ok=True)
 
 
 @contextmanager
@@ -130,34 +125,34 @@ def whole_folder(folder: Path) -> Iterator[Path]:
         InputError: the folder cannot be written.
     """
     make_folder(folder.parent)
-    place = unfinished_name(folder)
-    old = place.with_suffix(".old")
+    unnamed = unfinished_name(folder)
+    old = unnamed.with_suffix(".old")
     try:
-        place.mkdir()
-        yield place
+        unnamed.mkdir()
+        yield unnamed
         if folder.exists():
             folder.rename(old)
-        place.rename(folder)
+        unnamed.rename(folder)
     except OSError as error:
         raise InputError(f"{folder}: cannot be written ({error.strerror})") from None
     finally:
         if old.exists() and not folder.exists():
             old.rename(folder)
-        for left in (place, old):
-            shutil.rmtree(left, ignore_errors=True)
+        for remains in (unnamed, old):
+            shutil.rmtree(remains, ignore_errors=True)
 
 
 def unfinished_name(path: Path) -> Path:
     """Return a new hidden name beside ``path``; remove what killed processes have left of it."""
-    for left in path.parent.glob(f".{escape(path.name)}.{'[0-9a-f]' * 8}"):
+    for remains in path.parent.glob(f".{escape(path.name)}.{'[0-9a-f]' * 8}"):
         with suppress(OSError):  # of somebody else, or gone by now
-            if time.time() > left.lstat().st_mtime + ABANDONED_S:
-                shutil.rmtree(left) if left.is_dir() else left.unlink()
+            if time.time() > remains.lstat().st_mtime + ABANDONED_S:
+                shutil.rmtree(remains) if remains.is_dir() else remains.unlink()
     return path.with_name(f".{path.name}.{token_hex(4)}")
 
 
 @contextmanager
-def _told(path: Path) -> Iterator[None]:
+def _written(path: Path) -> Iterator[None]:
     try:
         yield
     except FileExistsError:

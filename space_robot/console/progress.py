@@ -1,4 +1,4 @@
-"""Progress lines on standard error, or in a notebook, for flights and for series of tasks."""
+"""Progress lines on standard error, for flights and for series of tasks."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
+from typing import Protocol
 
 from rich.progress import (
     BarColumn,
@@ -21,15 +22,13 @@ from rich.text import Text
 from space_robot_msgs_py.config.validation import short
 from space_robot_msgs_py.errors import InputError
 
-from .notebook import NotebookProgress, is_in_notebook
 from .terminal import say, terminal
 
 LINE_S = 60.0
 """Time between two lines in a file, where no line can be redrawn."""
 WATCH_S, WATCHED_LINE_S = 0.5, 5.0
 """Time between two counts of watched tasks, and between two lines about them."""
-WATCHER = "progress"
-"""Name of the counting thread."""
+COUNTS = "{task.completed:.0f}/{task.total:.0f}"
 
 
 class FlightProgress:
@@ -51,8 +50,7 @@ class FlightProgress:
 @contextmanager
 def flight_progress(total_s: float, what: str) -> Iterator[FlightProgress]:
     """Show a progress line for a flight of ``total_s`` seconds."""
-    remark = TextColumn("{task.fields[remark]}", markup=False)
-    with _bar("{task.completed:.1f}/{task.total:.1f} s simulated", remark) as progress:
+    with _bar("{task.completed:.1f}/{task.total:.1f} s simulated", _remark()) as progress:
         yield FlightProgress(progress, total_s, what)
 
 
@@ -68,50 +66,42 @@ def counting_progress(
     with ExitStack() as stack:
 
         def begin(total: int) -> Callable[[], None]:
-            counts = "{task.completed:.0f}/{task.total:.0f}"
-            progress = stack.enter_context(_bar(counts, is_transient=is_transient))
+            progress = stack.enter_context(_bar(COUNTS, is_transient=is_transient))
             task = progress.add_task(what, total=total)
             return lambda: progress.advance(task)
 
         yield begin
 
 
-@contextmanager
-def rated_progress(what: str, line_s: float = LINE_S) -> Iterator[Callable[[int, int, str], None]]:
-    """Show a progress line with rate and remaining time for many tasks.
+class ShowCounts(Protocol):
+    """Shows the number of done tasks, the total number and a remark."""
 
-    It starts at the first call, with the number of done tasks, the total number and a remark. In a
-    file, such as the log of a cluster job, it is a line every ``line_s`` seconds.
+    def __call__(self, done: int, total: int, remark: str = "") -> None: ...  # noqa: D102
+
+
+@contextmanager
+def rated_progress(what: str, line_s: float = LINE_S) -> Iterator[ShowCounts]:
+    """Show a progress line with rate and remaining time for many tasks, from the first call on.
+
+    In a file, such as the log of a cluster job, it is a line every ``line_s`` seconds.
     """
     with ExitStack() as stack:
         progress: Progress | None = None
-        console, told_at = terminal(stderr=True), time.monotonic()
+        console, shown_at = terminal(stderr=True), time.monotonic()
 
-        def show(done: int, total: int, remark: str) -> None:
-            nonlocal progress, told_at
-            is_file = not console.is_terminal and not is_in_notebook()
-            if is_file and time.monotonic() >= told_at + line_s:
-                told_at = time.monotonic()
-                line = f"{what} {done}/{total}"
-                say(console, f"{line}, {remark}" if remark else line)
+        def show(done: int, total: int, remark: str = "") -> None:
+            nonlocal progress, shown_at
+            if not console.is_terminal and time.monotonic() >= shown_at + line_s:
+                shown_at = time.monotonic()
+                say(console, ", ".join(filter(None, (f"{what} {done}/{total}", remark))))
             if progress is None:
-                remarks = TextColumn("{task.fields[remark]}", markup=False)
-                counts = "{task.completed:.0f}/{task.total:.0f}"
-                progress = stack.enter_context(
-                    _bar(counts, _Rate(), TimeRemainingColumn(compact=True), remarks)
-                )
+                remaining = TimeRemainingColumn(compact=True)
+                progress = stack.enter_context(_bar(COUNTS, _Rate(), remaining, _remark()))
                 progress.add_task(what, completed=done, total=total, remark=remark)
             else:
                 progress.update(progress.task_ids[0], completed=done, total=total, remark=remark)
 
         yield show
-
-
-@contextmanager
-def flights_progress(total: int) -> Iterator[Callable[[int], None]]:
-    """Show a progress line for ``total`` flights; call what it yields with the number of done."""
-    with rated_progress("flights") as show:
-        yield lambda done: show(done, total, "")
 
 
 def check_progress(progress: object) -> None:
@@ -128,51 +118,45 @@ def check_progress(progress: object) -> None:
 
 @contextmanager
 def watching_progress(what: str, total: int, count: Callable[[], int]) -> Iterator[None]:
-    """Show a progress line for tasks of other processes, which are counted regularly.
-
-    Args:
-        what: name of the tasks.
-        total: number of tasks.
-        count: returns the number of done tasks.
-    """
+    """Show a progress line for tasks of other processes; ``count`` returns how many are done."""
     is_over = threading.Event()
 
     def watch() -> None:
         while not is_over.wait(WATCH_S):
-            show(count(), total, "")
+            show(count(), total)
 
     with rated_progress(what, WATCHED_LINE_S) as show:
-        show(count(), total, "")
-        watcher = threading.Thread(target=watch, name=WATCHER, daemon=True)
+        show(count(), total)
+        watcher = threading.Thread(target=watch, daemon=True)
         watcher.start()
         try:
             yield
         finally:
             is_over.set()
             watcher.join()
-        show(count(), total, "")
+        show(count(), total)
 
 
 class _Rate(ProgressColumn):
-    """Column with the recent rate of tasks per second."""
-
     def render(self, task: Task) -> Text:
-        """Return the text of the column."""
+        """Return the recent rate of tasks per second."""
         speed = task.finished_speed or task.speed
         return Text(f"{speed:.3g}/s" if speed else "")
 
 
+def _remark() -> TextColumn:
+    return TextColumn("{task.fields[remark]}", markup=False)
+
+
 def _bar(done: str, *more: ProgressColumn, is_transient: bool = False) -> Progress:
     """Return a line with a bar; ``done`` is the format of the progress beside it."""
-    columns = (
+    return Progress(
         TextColumn("{task.description}", markup=False),
         BarColumn(bar_width=24),
         TextColumn(done),
         TimeElapsedColumn(),
         *more,
-    )
-    if is_in_notebook():
-        return NotebookProgress(*columns, is_transient=is_transient)
-    return Progress(
-        *columns, console=terminal(stderr=True), refresh_per_second=5, transient=is_transient
+        console=terminal(stderr=True),
+        refresh_per_second=5,
+        transient=is_transient,
     )

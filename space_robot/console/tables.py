@@ -1,12 +1,10 @@
-"""Data model of all tables, and its text formats: Markdown, CSV, JSON.
+"""Data model of all tables, and their text as Markdown.
 
 `terminal_tables.print_table` prints it on a terminal, ``templates/table.html.j2`` in a page.
 """
 
 from __future__ import annotations
 
-import csv
-import io
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
@@ -74,11 +72,6 @@ class Table:
         """Return a table with one group without name."""
         return cls(title, columns, [Group(rows)])
 
-    @property
-    def has_named_groups(self) -> bool:
-        """True if the table shows the groups' names."""
-        return any(group.name for group in self.groups)
-
     def texts(self, group: Group) -> Iterator[list[str]]:
         """Yield each row of a group as texts."""
         for row in group.rows:
@@ -105,19 +98,3 @@ def as_markdown(title: str, tables: Sequence[Table]) -> str:
         for note in table.notes:
             lines += [note, ""]
     return "\n".join(lines)
-
-
-def as_csv(table: Table) -> str:
-    """Return the table as CSV with full precision; missing values are empty."""
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(column.name for column in table.columns)
-    for group in table.groups:
-        writer.writerows(group.rows)
-    return text.getvalue()
-
-
-def as_records(table: Table) -> list[dict[str, Any]]:
-    """Return one dictionary per row, by column name, for JSON."""
-    names = [column.name for column in table.columns]
-    return [dict(zip(names, row, strict=True)) for group in table.groups for row in group.rows]
