@@ -4,11 +4,9 @@ Nothing here uses pyplot or changes matplotlib's settings, so figures may be dra
 processes. The same log gives the same bytes.
 """
 
-from .base_actuators import momentum, thrusters, wheels
 from .base_torque import chatter, junctions
-from .overlay import errors_and_torques, latency_histogram, pointing
-from .ripple import ripple
-from .single_flight import control_results, desired_joints
+from .overlay import errors_and_torques, latency_histogram, pointing, ripple
+from .single_flight import control_results, desired_joints, kind_figure, limit_cycle
 from .style import save_figure
 
 __all__ = [
@@ -17,11 +15,10 @@ __all__ = [
     "desired_joints",
     "errors_and_torques",
     "junctions",
+    "kind_figure",
     "latency_histogram",
-    "momentum",
+    "limit_cycle",
     "pointing",
     "ripple",
     "save_figure",
-    "thrusters",
-    "wheels",
 ]

@@ -17,7 +17,6 @@ from .flight_curves import BaseTorque
 from .single_flight import BASE_AXES, JUNCTION_HALF_WIDTH
 from .style import (
     GREY,
-    LineStyle,
     grid,
     house_style,
     legend_above,
@@ -25,7 +24,7 @@ from .style import (
     page,
     plain,
     plot_lines,
-    scattered,
+    plot_spectrum,
 )
 
 Array = NDArray[np.float64]
@@ -130,17 +129,7 @@ def _draw_spectra(axes: Axes, spectra: Mapping[str, tuple[Array, Array]]) -> Non
     for index, (frequency, density) in enumerate(spectra.values()):
         if not np.isfinite(density).any():  # too short, or zero torque
             continue
-        look = LineStyle.of(index)
-        even = np.geomspace(frequency[0], frequency[-1], 1000)
-        marks = np.searchsorted(frequency, even[scattered(len(even), index, len(spectra))])
-        axes.plot(
-            frequency,
-            density,
-            color=look.colour,
-            linestyle=look.dashes,
-            marker=look.marker,
-            markevery=marks.tolist(),
-        )
+        plot_spectrum(axes, frequency, density, index, len(spectra))
     axes.set(xscale="log", yscale="log")
     if not axes.get_lines():  # a single marker defines no scale
         axes.set_xlim(0.1 * CHATTER_FREQUENCY, 10.0 * CHATTER_FREQUENCY)

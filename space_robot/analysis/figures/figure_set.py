@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import base64
-from collections.abc import Callable, Iterable, Iterator
-from contextlib import suppress
+from collections.abc import Callable, Iterable
 from functools import partial
 from pathlib import Path
 from typing import NamedTuple
@@ -13,19 +12,15 @@ from matplotlib.figure import Figure
 
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.bag.law_history import as_data, laws_of
-from space_robot_msgs_py.errors import InputError
 
-from ..described import flown_actuators
-from ..external_torques import torques_by_source
-from ..momentum import momentum_of
+from ..analysed_log import AnalysedLog
+from ..plotted import KINDS, quantities_of
 from ..pointing_budget import PointingBudget
 from ..words import flown
-from .base_actuators import deflections, momentum, thrusters, torques_from_outside, wheels
 from .base_torque import chatter, junctions
 from .flight_curves import FlightCurves
-from .overlay import base_pointing, errors_and_torques, latency_histogram, pointing
-from .ripple import ripple
-from .single_flight import control_results, desired_joints
+from .overlay import base_pointing, errors_and_torques, latency_histogram, pointing, ripple
+from .single_flight import control_results, desired_joints, kind_figure, limit_cycle
 from .style import save_figure
 
 
@@ -91,14 +86,8 @@ class FigureSet:
         if not self._flights:
             self._first = control_results(log, title(name, log))
         self._flights[name] = FlightCurves.of(log, self._budget)
-        kinds = {
-            _of_gears: bool(log.geared_names),
-            _of_orbit: log.orbit_position.shape[1] > 0,
-            _of_hardware: bool(log.flight.get("base_actuators")),
-        }
-        for draw in (draw for draw, is_there in kinds.items() if is_there):
-            with suppress(InputError):
-                self._parts[name] = self._parts.get(name, {}) | dict(draw(log.longest_stretch()))
+        if parts := _parts(log.longest_stretch()):
+            self._parts[name] = parts
 
     def save(self, folder: Path) -> list[SavedFigure]:
         """Draw all figures into ``folder`` as PNG and SVG; existing files are replaced.
@@ -142,8 +131,7 @@ class FigureSet:
                 drawings[f"{stem}{suffix}"] = Drawing(f"{caption}{of}", partial(_drawn, figure))
         if torques:
             caption = "The base's pointing error; dotted: the band"
-            draw = partial(base_pointing, flights, self._budget.band_deg)
-            drawings["base_pointing"] = Drawing(caption, draw)
+            drawings["base_pointing"] = Drawing(caption, partial(base_pointing, flights))
         caption = "The end effector's pointing error in the inertial frame"
         drawings["pointing"] = Drawing(caption, partial(pointing, flights))
         caption = "Time from a state's sending to its command's"
@@ -155,40 +143,17 @@ def _drawn(figure: Figure) -> Figure:
     return figure
 
 
-def _of_gears(log: FlightLog) -> Iterator[tuple[str, tuple[str, Figure]]]:
-    """Yield file name, caption and figure of the joints with gears."""
-    yield "deflections", ("Deflection of the joints with gears", deflections(log))
-
-
-def _of_orbit(log: FlightLog) -> Iterator[tuple[str, tuple[str, Figure]]]:
-    """Yield file name, caption and figure of what acts in an orbit.
-
-    Raises:
-        InputError: the environment is unknown.
-    """
-    torques = {name: torque(0, log.ticks) for name, torque in torques_by_source(log).items()}
-    caption = "Torques from outside about the common centre of mass"
-    yield "torques_from_outside", (caption, torques_from_outside(log, torques))
-
-
-def _of_hardware(log: FlightLog) -> Iterator[tuple[str, tuple[str, Figure]]]:
-    """Yield file name, caption and figure of the momentum and of the base's actuators.
-
-    Raises:
-        InputError: robot, actuators or environment are unknown, or there is no complete tick.
-    """
-    if not log.ticks:
-        raise InputError("no tick has both a state and a reference")
-    flown, budget = flown_actuators(log), momentum_of(log)
-    caption = "Angular momentum about the common centre of mass"
-    yield "momentum", (caption, momentum(log, budget, flown))
-    if flown.wheel_count:
-        caption = "Momentum and torque of the wheels, between their limits"
-        yield "wheels", (caption, wheels(log, flown.wheels))
-    if flown.thruster_count:
-        pushed = budget.centre_of_mass - budget.centre_of_mass[0]
-        caption = "Pulses and propellant, how far the robot was pushed, and the limit cycle"
-        yield "thrusters", (caption, thrusters(log, pushed, flown.thrusters))
+def _parts(log: FlightLog) -> dict[str, tuple[str, Figure]]:
+    """Return caption and figure by file name of what a flight has: actuators, orbit, gears."""
+    flight, parts = AnalysedLog(log), dict[str, tuple[str, Figure]]()
+    for name, kind in KINDS.items() if log.ticks else ():
+        drawn = [q for _, q in quantities_of(flight, [name]) if q.is_drawn] if kind.figure else []
+        if drawn:
+            parts[kind.figure] = kind.caption, kind_figure(log, drawn)
+        if drawn and any(quantity.are_pulses for quantity in drawn):
+            caption = "The attitude's limit cycle: rate error over attitude error"
+            parts["limit_cycle"] = caption, limit_cycle(log)
+    return parts
 
 
 def title(name: str, log: FlightLog) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from contextlib import suppress
 from typing import NamedTuple
 
@@ -15,15 +16,15 @@ from space_robot_msgs_py.errors import InputError
 from ..analysed_log import AnalysedLog
 from ..described import event_times
 from ..errors import AxisIndex, controls_base
+from ..plotted import PlottedQuantity, quantities_of
 from ..pointing_budget import PointingBudget
-from ..series import GROUPS, SeriesGroup
 from ..torques import RippleSpectrum, ripple_spectrum
 from ..waypoints import junction_ticks
 
 Array = NDArray[np.float64]
 
-DRAWN = ("errors", "torques", "end_effector")
-"""Series whose columns are drawn over time."""
+DRAWN = ("attitude", "joints", "pointing", "tool", "base", "torques")
+"""Kinds of quantities whose sizes are drawn over time."""
 
 
 class BaseTorque(NamedTuple):
@@ -57,13 +58,30 @@ class BaseTorque(NamedTuple):
         return self.start + len(self.torque) * self.period
 
 
+class SizeCurve(NamedTuple):
+    """Size of a quantity at each tick."""
+
+    kind: str
+    label: str
+    """Title and unit."""
+    size: Array
+    """(N,)."""
+    is_error: bool
+    limits: Sequence[float]
+
+    @classmethod
+    def of(cls, kind: str, quantity: PlottedQuantity) -> Self:
+        """Return the norm of the quantity over its axes."""
+        return cls(kind, quantity.label, quantity.size, quantity.is_error, quantity.limits)
+
+
 class FlightCurves(NamedTuple):
-    """Sizes of a flight's series over time, its base torque, ripple and latency."""
+    """Sizes of a flight's quantities over time, its base torque, ripple and latency."""
 
     time: Array
     """(N,) s."""
-    sizes: dict[str, Array]
-    """(N,) size of each column of the series in `DRAWN`, in its unit."""
+    sizes: list[SizeCurve]
+    """Of the kinds in `DRAWN`."""
     base_torque: BaseTorque | None
     """None where nothing turned the base."""
     latency_ms: Array | None
@@ -81,14 +99,7 @@ class FlightCurves(NamedTuple):
 
         ``budget``: of the base's pointing; None: the default.
         """
-        flight, parts = AnalysedLog(log, budget), dict[str, list[Array]]()
-        for name in DRAWN:
-            group = GROUPS[name]
-            assert isinstance(group, SeriesGroup)
-            with suppress(InputError):
-                for _, sizes in group.sizes(flight):
-                    for column, size in sizes.items():
-                        parts.setdefault(column, []).append(size)
+        flight = AnalysedLog(log, budget)
         ripple = latency = None
         with suppress(InputError):
             ripple = ripple_spectrum(flight)
@@ -97,7 +108,7 @@ class FlightCurves(NamedTuple):
             latency = 1e3 * known if len(known) else None
         return cls(
             log.time,
-            {column: np.concatenate(sizes) for column, sizes in parts.items()},
+            [SizeCurve.of(kind, quantity) for kind, quantity in quantities_of(flight, DRAWN)],
             BaseTorque.of(log) if controls_base(log) else None,
             latency,
             ripple,

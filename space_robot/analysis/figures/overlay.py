@@ -1,8 +1,8 @@
-"""Figures of several overlaid flights: errors, torques, pointing, latency."""
+"""Figures of several overlaid flights: errors, torques, their ripple, pointing, latency."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -10,10 +10,18 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from ..analysed_log import ANGLES
 from ..measure import column_label, column_unit
-from .flight_curves import FlightCurves
-from .style import GREY, LineStyle, house_style, legend_above, mark_events, page, plot_lines
+from .flight_curves import FlightCurves, SizeCurve
+from .style import (
+    GREY,
+    LineStyle,
+    house_style,
+    legend_above,
+    mark_events,
+    page,
+    plot_lines,
+    plot_spectrum,
+)
 
 Array = NDArray[np.float64]
 
@@ -28,8 +36,8 @@ class _Panel(NamedTuple):
     """Time, s, and values of each flight with data for a panel."""
     label: str
     is_logarithmic: bool
-    limit: float | None = None
-    """Drawn as a line across."""
+    limit: float
+    """Drawn as a line across; 0: none."""
 
 
 @house_style()
@@ -39,35 +47,27 @@ def errors_and_torques(flights: Mapping[str, FlightCurves]) -> Figure:
     Args:
         flights: by name.
     """
-    torques = dict.fromkeys(name for curves in flights.values() for name in curves.torque_axes)
-    names = dict.fromkeys(name for curves in flights.values() for name in curves.sizes)
-    errors = [name for name in names if name.startswith(("attitude_angle", "joints_"))]
-    panels = [_panels(flights, errors, True, " error"), _panels(flights, list(torques), False)]
-    return _draw(panels, list(flights), _events(flights))
+    errors = _panels(flights, lambda c: c.kind in ("attitude", "joints") and c.is_error)
+    torques = _panels(flights, lambda curve: curve.kind == "torques")
+    return _draw([errors, torques], flights)
 
 
 @house_style()
 def pointing(flights: Mapping[str, FlightCurves]) -> Figure:
     """Draw the end effector's errors of boresight, rotation and position, and the base's drift."""
-    panels = _panels(flights, ["boresight", "tool_attitude", "tool_position"], True, " error")
+    panels = _panels(flights, lambda curve: curve.kind == "tool")
     if not panels:
         return page(12.0, "No robot is known for these flights, so no pointing error.")
-    panels += _panels(flights, ["base_drift"], False)
-    return _draw([panels], list(flights), _events(flights))
+    return _draw([panels + _panels(flights, lambda curve: curve.kind == "base")], flights)
 
 
 @house_style()
-def base_pointing(flights: Mapping[str, FlightCurves], band_deg: float) -> Figure:
-    """Draw the base's errors of pointing: half cone, about the axis that points, and in all.
-
-    Args:
-        flights: by name.
-        band_deg: drawn as a line, degrees.
-    """
-    panels = _panels(flights, ANGLES, True, limit=3600.0 * band_deg)
+def base_pointing(flights: Mapping[str, FlightCurves]) -> Figure:
+    """Draw the base's pointing errors and the band: half cone, about the axis that points, all."""
+    panels = _panels(flights, lambda curve: curve.kind == "pointing")
     if not panels:
         return page(12.0, "Nothing turned the base of these flights, so no pointing error.")
-    return _draw([panels], list(flights), _events(flights))
+    return _draw([panels], flights)
 
 
 @house_style()
@@ -99,15 +99,44 @@ def latency_histogram(flights: Mapping[str, FlightCurves]) -> Figure:
     return figure
 
 
-def _events(flights: Mapping[str, FlightCurves]) -> Array:
-    """Return the times of captures and releases in any flight, s."""
-    times: Array = np.unique(np.concatenate([series.events for series in flights.values()]))
-    return times
+@house_style()
+def ripple(flights: Mapping[str, FlightCurves]) -> Figure:
+    """Draw the spectral density of the ripple, one panel per group of axes (mean of the axes).
+
+    Args:
+        flights: by name.
+    """
+    known = {name: s.ripple for name, s in flights.items() if s.ripple is not None}
+    if not known:
+        return page(12.0, "None of these flights has a known robot and is long enough for ripple.")
+    columns = [flights[name].torque_axes for name in known]
+    groups = {key: axes for column in columns for key, axes in column.items()}
+    figure = page(18.0 + 55.0 * len(groups))
+    panels = figure.subplots(len(groups), 1, sharex=True, squeeze=False)[:, 0]
+    names = list(flights)
+    for panel, key in zip(panels, groups, strict=True):
+        for (name, spectrum), column in zip(known.items(), columns, strict=True):
+            if key not in column:
+                continue
+            frequency = spectrum.frequency
+            density = spectrum.group(column[key]) / (frequency[1] - frequency[0])
+            if not density.any():
+                continue
+            shown = np.where(density > 0.0, density, np.nan)
+            plot_spectrum(panel, frequency, shown, names.index(name), len(names))
+        squared = "N²" if column_unit(key) == "N" else "(N m)²"
+        panel.set(xscale="log", yscale="log", ylabel=f"PSD of {column_label(key)} ({squared}/Hz)")
+    panels[-1].set_xlabel("frequency (Hz)")
+    panels[-1].xaxis.set_major_formatter("{x:g}")
+    figure.align_ylabels()
+    legend_above(figure, names, dashed=True)
+    return figure
 
 
-def _draw(columns: list[list[_Panel]], names: list[str], events: Array) -> Figure:
+def _draw(columns: list[list[_Panel]], flights: Mapping[str, FlightCurves]) -> Figure:
     """Plot columns of equally many panels over time, with one legend of all flights."""
-    rows = len(columns[0])
+    rows, names = len(columns[0]), list(flights)
+    events = np.unique(np.concatenate([curves.events for curves in flights.values()]))
     figure = page(18.0 + 38.0 * rows)
     grid = figure.subplots(rows, len(columns), sharex="col", squeeze=False)
     for panels, column in zip(columns, grid.T, strict=True):
@@ -132,7 +161,7 @@ def _draw_panel(axes: Axes, panel: _Panel, names: list[str]) -> None:
         if usual:
             axes.set_yscale("log", nonpositive="mask")
             axes.set_ylim(bottom=0.5 * min(usual))
-    if panel.limit is not None:
+    if panel.limit:
         axes.axhline(panel.limit, color=GREY, linewidth=0.8, linestyle=":")
         axes.set_ylim(top=max(axes.get_ylim()[1], 2.0 * panel.limit))
     axes.set_ylabel(panel.label)
@@ -143,20 +172,13 @@ def _roughness(values: Array) -> float:
 
 
 def _panels(
-    flights: Mapping[str, FlightCurves],
-    names: Sequence[str],
-    is_logarithmic: bool,
-    word: str = "",
-    limit: float | None = None,
+    flights: Mapping[str, FlightCurves], is_wanted: Callable[[SizeCurve], bool]
 ) -> list[_Panel]:
-    """Return a panel for every column that any flight has; ``word`` follows its label."""
-    panels = []
-    for name in names:
-        lines = {
-            key: (curves.time, curves.sizes[name])
-            for key, curves in flights.items()
-            if name in curves.sizes
-        }
-        label = f"{column_label(name)}{word} ({column_unit(name)})"
-        panels += [_Panel(lines, label, is_logarithmic, limit)] if lines else []
-    return panels
+    """Return a panel for every wanted quantity that any flight has."""
+    panels: dict[str, _Panel] = {}
+    for name, curves in flights.items():
+        for curve in filter(is_wanted, curves.sizes):
+            limit = max(curve.limits, default=0.0)
+            panel = panels.setdefault(curve.label, _Panel({}, curve.label, curve.is_error, limit))
+            panel.curves[name] = curves.time, curve.size
+    return list(panels.values())

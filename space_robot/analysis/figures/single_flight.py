@@ -1,20 +1,28 @@
-"""Figures of one flight, as in the paper's Fig. 5 and Figs. 6 to 9."""
+"""Figures of one flight: the paper's Fig. 5 and Figs. 6 to 9, and those of plotted quantities."""
 
 from __future__ import annotations
+
+from collections.abc import Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.gridspec import GridSpec
+from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from space_robot_msgs_py.bag.flight_log import FlightLog
 
+from ..analysed_log import AnalysedLog
 from ..described import event_times
-from ..errors import attitude_angles, attitude_drift, controls_base, tracking_error
+from ..errors import attitude_angles, tracking_error
+from ..generalised_motion import relative_rate
+from ..plotted import PlottedQuantity, quantities_of
 from ..waypoints import junction_ticks, waypoint_ticks
 from .style import (
+    GREY,
     PAGE_WIDTH,
+    LineStyle,
     house_style,
     legend_above,
     mark_events,
@@ -32,6 +40,10 @@ MOST_LETTERS = 16
 """Maximum length of joint names in a label, in characters."""
 MOST_JUNCTIONS = 3
 """Maximum number of enlarged junctions, from the first, that fit side by side."""
+BINS = 600
+"""Columns of the raster of pulses; brightness shows the duty cycle of a thruster."""
+POINTS = 6000
+"""Maximum number of points of a line in the phase plane."""
 
 
 @house_style()
@@ -40,24 +52,17 @@ def desired_joints(log: FlightLog) -> Figure:
 
     Prismatic joints have a separate panel.
     """
-    slides = np.array(log.prismatic[: len(log.joint_names)])
-    desired, time, waypoints = log.reference_joints[:, 0], log.time, waypoint_ticks(log)
-    panels = [
-        (np.flatnonzero(kind), values, label)
-        for kind, values, label in (
-            (~slides, np.degrees(desired), "desired joint angle (deg)"),
-            (slides, desired, "desired joint position (m)"),
-        )
-        if kind.any()
-    ]
+    time, waypoints = log.time, waypoint_ticks(log)
+    panels = [quantity for _, quantity in quantities_of(AnalysedLog(log), ["positions"])]
     figure = page(80.0 if len(panels) == 1 else 120.0)
     below = figure.subplots(len(panels), 1, sharex=True, squeeze=False)[:, 0]
-    for axes, (joints, values, label) in zip(below, panels, strict=True):
-        plot_lines(
-            axes, time, values[:, joints], looks=joints.tolist(), marks=waypoints, dashed=True
-        )
+    for axes, panel in zip(below, panels, strict=True):
+        assert panel.wanted is not None
+        looks = [log.joint_names.index(name) for name in panel.labels]
+        plot_lines(axes, time, panel.wanted, looks=looks, marks=waypoints, dashed=True)
         mark_moments(axes, time[waypoints])
-        axes.set_ylabel(label)
+        kind = "angle" if panel.unit == "deg" else "position"
+        axes.set_ylabel(f"desired joint {kind} ({panel.unit})")
     below[-1].set_xlabel("time (s)")
     legend_above(figure, log.joint_names, dashed=True)
     return figure
@@ -75,23 +80,21 @@ def control_results(log: FlightLog, title: str) -> Figure:
         log: a flight, complete or not.
         title: of the figure.
     """
-    error, torque, time = tracking_error(log), log.applied_torque, log.time
-    of_base, error[:, :3] = "attitude error (deg)", attitude_angles(log)
-    if not controls_base(log):
-        of_base, error[:, :3] = "attitude drift (deg)", np.degrees(attitude_drift(log))
+    (_, attitude), *_ = quantities_of(AnalysedLog(log), ["attitude"])
+    error, torque, time = tracking_error(log)[:, 3:], log.applied_torque, log.time
     moments = time[junction_ticks(log)[:MOST_JUNCTIONS]]
     rows = 3 if len(moments) else 2
     figure = page(22.0 + 46.0 * rows, title)
     cells = figure.add_gridspec(rows, 2)
-    for column, (part, names, error_label, torque_label) in enumerate(
+    for column, (values, part, names, error_label, torque_label) in enumerate(
         (
-            (slice(0, 3), BASE_AXES, of_base, "base torque (N m)"),
-            (slice(3, None), log.joint_names, *_joint_labels(log)),
+            (attitude.values, slice(0, 3), BASE_AXES, attitude.label, "base torque (N m)"),
+            (error, slice(3, None), log.joint_names, *_joint_labels(log)),
         )
     ):
         errors = figure.add_subplot(cells[0, column])
         torques = figure.add_subplot(cells[1, column], sharex=errors)
-        plot_lines(errors, time, error[:, part])
+        plot_lines(errors, time, values)
         plot_lines(torques, time, torque[:, part])
         for axes in (errors, torques):
             mark_moments(axes, moments)
@@ -137,3 +140,74 @@ def _enlarge(
         axes.locator_params(axis="x", nbins=7 if len(moments) == 1 else 3)
     first: Axes = panels[0]
     return first
+
+
+@house_style()
+def kind_figure(log: FlightLog, quantities: Sequence[PlottedQuantity]) -> Figure:
+    """Draw quantities of a kind below one another, with their limits; pulses as a raster."""
+    heights = [60.0 if quantity.are_pulses else 45.0 for quantity in quantities]
+    figure = page(18.0 + sum(heights))
+    panels = figure.subplots(len(heights), 1, sharex=True, squeeze=False, height_ratios=heights)[
+        :, 0
+    ]
+    lines = [quantity for quantity in quantities if not quantity.are_pulses]
+    is_common = len({tuple(quantity.labels) for quantity in lines}) == 1
+    for axes, quantity in zip(panels, quantities, strict=True):
+        if quantity.are_pulses:
+            _draw_pulses(axes, log.time, quantity.values, log.timebase.period)
+            continue
+        plot_lines(axes, log.time, quantity.values)
+        for limit in {*quantity.limits} - {0.0}:
+            for side in (-limit, limit):
+                axes.axhline(side, color=GREY, linewidth=0.8, linestyle=":", zorder=1.5)
+        axes.set_ylabel(quantity.label)
+        if not is_common:
+            legend_above(axes, quantity.labels, dashed=False)
+    panels[-1].set_xlabel("time (s)")
+    figure.align_ylabels()
+    if is_common:
+        legend_above(figure, lines[0].labels, dashed=False)
+    return figure
+
+
+def _draw_pulses(axes: Axes, time: Array, is_open: Array, period: float) -> None:
+    """Draw one row per thruster, dark where it is open."""
+    length = max(1, -(-len(time) // BINS))
+    starts = np.arange(0, len(time), length)
+    counts = np.diff(np.append(starts, len(time)))
+    share = np.add.reduceat(np.nan_to_num(is_open), starts, axis=0) / counts[:, np.newaxis]
+    count = is_open.shape[1]
+    axes.imshow(
+        share.T,
+        cmap="Greys",
+        vmin=0.0,
+        vmax=1.0,
+        aspect="auto",
+        interpolation="nearest",
+        extent=(time[0] - period, time[0] + (starts[-1] + length - 1) * period, count + 0.5, 0.5),
+    )
+    axes.grid(visible=False)
+    axes.yaxis.set_major_locator(MaxNLocator(integer=True))
+    axes.set_ylabel("thruster, open")
+    axes.set_xlim(time[0] - period, time[-1])
+
+
+@house_style()
+def limit_cycle(log: FlightLog) -> Figure:
+    """Draw the base's rate error over its attitude error, both about the base's axes."""
+    figure, every = page(90.0), max(1, log.ticks // POINTS)
+    axes = figure.subplots()
+    angle, rate = attitude_angles(log)[::every], -np.degrees(relative_rate(log)[::every])
+    for i in range(3):
+        look = LineStyle.of(i)
+        axes.plot(
+            angle[:, i],
+            rate[:, i],
+            color=look.colour,
+            linewidth=0.5,
+            marker=look.marker,
+            markevery=[len(angle) // 2],
+        )
+    axes.set(xlabel="attitude error (deg)", ylabel="rate error (deg/s)")
+    legend_above(figure, BASE_AXES, dashed=False)
+    return figure

@@ -151,6 +151,20 @@ def scattered(samples: int, index: int, count: int) -> Indices:
     return np.unique((places * samples).astype(np.intp))
 
 
+def plot_spectrum(axes: Axes, frequency: Array, density: Array, index: int, count: int) -> None:
+    """Plot a spectrum as line ``index`` of ``count``, for logarithmic axes."""
+    look = LineStyle.of(index)
+    even = np.geomspace(frequency[0], frequency[-1], 1000)
+    axes.plot(
+        frequency,
+        density,
+        color=look.colour,
+        linestyle=look.dashes,
+        marker=look.marker,
+        markevery=np.searchsorted(frequency, even[scattered(1000, index, count)]).tolist(),
+    )
+
+
 def mark_moments(axes: Axes, moments: Array) -> None:
     """Draw dotted vertical lines at ``moments``, in the unit of the horizontal axis."""
     for moment in moments:

@@ -24,6 +24,7 @@ from strategies import random_log, random_robot
 
 from space_robot import Scenario
 from space_robot.analysis import excerpt, tracking_error
+from space_robot.analysis.analysed_log import AnalysedLog
 from space_robot.analysis.errors import attitude_angles
 from space_robot.analysis.figures import (
     chatter,
@@ -31,12 +32,10 @@ from space_robot.analysis.figures import (
     desired_joints,
     errors_and_torques,
     junctions,
+    kind_figure,
     latency_histogram,
-    momentum,
     pointing,
     save_figure,
-    thrusters,
-    wheels,
 )
 from space_robot.analysis.figures.base_torque import common_limits, power_spectral_density
 from space_robot.analysis.figures.figure_set import FigureSet
@@ -44,6 +43,7 @@ from space_robot.analysis.figures.flight_curves import BaseTorque, FlightCurves
 from space_robot.analysis.figures.overlay import base_pointing
 from space_robot.analysis.figures.style import LineStyle, house_style, thinned
 from space_robot.analysis.momentum import momentum_of
+from space_robot.analysis.plotted import PlottedQuantity, quantities_of
 from space_robot_control.guidance.mission import Mission, MissionSettings
 from space_robot_model.hardware.base_actuators import BaseActuatorSettings
 from space_robot_model.robot import Robot
@@ -299,18 +299,18 @@ def test_each_panel_has_a_line_a_flight_over_its_time(overlaid: dict[str, Flight
     front = max(torque.get_lines(), key=lambda line: line.get_zorder())
     assert rough[front.get_color()] == min(rough.values())
     assert error.get_yscale() == "log"
-    sizes = [curves.sizes["attitude_angle"] for curves in overlaid.values()]
+    sizes = [curves.sizes[0].size for curves in overlaid.values()]
     lowest = min(np.percentile(size[size > 0.0], 0.5) for size in sizes)
     assert error.get_ylim()[0] == pytest.approx(0.5 * lowest)
-    assert error.get_ylabel() == "attitude angle error (deg)"
+    assert error.get_ylabel() == "attitude error (deg)"
     unknown = {
-        name: curves._replace(sizes={"joints_1_3": curves.sizes["joints_1_3"]})
+        name: curves._replace(sizes=[c for c in curves.sizes if c.kind == "joints"])
         for name, curves in overlaid.items()
     }
     assert not pointing(unknown).axes
-    drawn = base_pointing(overlaid, 0.5)
+    drawn = base_pointing(overlaid)
     limits = [data_of(axes.get_lines()[-1])[1].tolist() for axes in drawn.axes]
-    assert limits == [[1800.0, 1800.0]] * 3
+    assert limits == [[360.0, 360.0]] * 3
 
 
 def test_the_histogram_counts_every_answer(overlaid: dict[str, FlightCurves]) -> None:
@@ -334,22 +334,26 @@ def lively_log(robot: Robot, actuators: BaseActuatorSettings, ticks: int = 50) -
     return log
 
 
+def figure_of(log: FlightLog, kind: str) -> tuple[Figure, list[PlottedQuantity]]:
+    """The figure of a kind, and the quantities on it."""
+    found = [q for _, q in quantities_of(AnalysedLog(log), [kind]) if q.is_drawn]
+    return kind_figure(log, found), found
+
+
 def test_momentum_and_wheels_between_their_limits(paper_robot: Robot) -> None:
     """Of a free base what arm and base exchange."""
     log = lively_log(paper_robot, hardware(wheels=WHEELS))
     found = momentum_of(log)
-    figure = momentum(log, found, hardware(wheels=WHEELS))
-    assert legend_names(figure)[0] == ["robot", "wheels", "sum"]
-    for i, axes in enumerate(figure.axes):
-        drawn = [data_of(line)[1].tolist() for line in axes.get_lines()]
-        for wanted in (found.robot, found.wheels, found.robot + found.wheels):
-            assert wanted[:, i].tolist() in drawn
-    free = lively_log(paper_robot, FREE)
-    found = momentum_of(free)
-    assert legend_names(momentum(free, found, FREE))[0] == ["base", "arm", "sum"]
-    outside = found._replace(outside=found.outside + 1.0)
-    assert len(legend_names(momentum(free, outside, FREE))[0]) == 4
-    above, below = wheels(log, BOTH.wheels).axes
+    figure, quantities = figure_of(log, "momentum")
+    titles = ["angular momentum", "robot momentum", "momentum of all wheels"]
+    assert [quantity.title for quantity in quantities] == titles
+    assert legend_names(figure) == [["x", "y", "z"]]
+    for axes, wanted in zip(figure.axes, (found.total, found.robot, found.wheels), strict=True):
+        shown = [data_of(line)[1].tolist() for line in axes.get_lines()]
+        assert all(wanted[:, i].tolist() in shown for i in range(3))
+    _, quantities = figure_of(lively_log(paper_robot, FREE), "momentum")
+    assert [q.title for q in quantities][1:] == ["base momentum", "arm momentum"]
+    above, below = figure_of(log, "wheels")[0].axes
     for axes, values, limit in (
         (above, log.wheel_velocities * 0.01, 3.0),
         (below, log.wheel_torques, 0.5),
@@ -364,7 +368,7 @@ def test_momentum_and_wheels_between_their_limits(paper_robot: Robot) -> None:
 @pytest.mark.parametrize("ticks", [1, 1300])
 def test_the_raster_is_dark_where_a_thruster_is_open(paper_robot: Robot, ticks: int) -> None:
     log = lively_log(paper_robot, hardware(thrusters=THRUSTERS), ticks)
-    pulses, used, *_ = thrusters(log, np.zeros((ticks, 3)), BOTH.thrusters).axes
+    pulses, used, _ = figure_of(log, "thrusters")[0].axes
     (image,) = pulses.get_images()
     shown = np.asarray(image.get_array())
     length = -(-ticks // shown.shape[1])
@@ -383,7 +387,7 @@ def test_of_several_flights_each_has_its_own(paper_robot: Robot, tmp_path: Path)
 
     Thrusters that never fired gave no torque at all, which has no spectrum.
     """
-    still, names = FigureSet(), {"momentum", "wheels", "thrusters"}
+    still, names = FigureSet(), {"momentum", "wheels", "thrusters", "limit_cycle"}
     still.add("one", still_log(paper_robot, 100, BOTH))
     assert names <= {name for name, drawing in still.drawings().items() if drawing.draw().axes}
     lying = lively_log(paper_robot, FREE)
