@@ -11,13 +11,12 @@ from typing import Any
 from pydantic import BaseModel
 
 from space_robot_control.controller.law_choice import NoLaw
-from space_robot_control.controller.settings import DEFAULT, ControllerNodeSettings
-from space_robot_control.guidance.mission import Mission, MissionNodeSettings, MissionSettings
+from space_robot_control.controller.settings import DEFAULT
+from space_robot_control.guidance.mission import Mission, MissionSettings
 from space_robot_control.laws import ControlLaw
 from space_robot_model.hardware.base_actuators import BaseActuatorSettings
 from space_robot_model.hardware.sensors import SensorSettings
-from space_robot_msgs_py.bag.recorder import RecorderNodeSettings
-from space_robot_msgs_py.config.files import Tree
+from space_robot_msgs_py.config.files import Tree, flatten
 from space_robot_msgs_py.errors import InputError
 from space_robot_sim.actuators.actuators import ActuatorSettings
 from space_robot_sim.environment.disturbance_table import DisturbanceTable
@@ -27,17 +26,17 @@ from space_robot_sim.environment.orbit import OrbitSettings
 from space_robot_sim.faults.grammar import Fault
 from space_robot_sim.plant.plant import Plant
 from space_robot_sim.plant.report import actuators, plant_description
-from space_robot_sim.plant.settings import MOST_TICKS, PLANT_KINDS, PlantNodeSettings
+from space_robot_sim.plant.settings import MOST_TICKS, PLANT_KINDS
 
 from .faults import PROCESS_KINDS
-from .node_settings import NODES, NOT_TO_BE_SET, FlightSettings
+from .node_settings import NODES, NOT_TO_BE_SET, OPTIONS_OF_NODES, FlightSettings
 from .options import OPTIONS
 from .robots import Robots
 from .scenario import Scenario
 
 
 @dataclass(frozen=True)
-class ResolvedScenario:
+class ResolvedScenario(FlightSettings):
     """Complete definition of a flight, made by `space_robot.scenario.resolve.resolve`.
 
     The settings are decisive, not the options: single parameters override options.
@@ -45,8 +44,6 @@ class ResolvedScenario:
 
     options: Scenario
     """Options as the user wrote them."""
-    settings: FlightSettings
-    """Settings of every node."""
     mission_name: str
     """Name of the mission's file; the robot's name if the mission belongs to the robot."""
     robots: Robots
@@ -63,26 +60,6 @@ class ResolvedScenario:
     """Faults of the nodes' processes; faults of the plant are in its settings."""
 
     @property
-    def plant(self) -> PlantNodeSettings:
-        """The settings of the plant's node."""
-        return self.settings.plant
-
-    @property
-    def controller(self) -> ControllerNodeSettings:
-        """The settings of the controller's node."""
-        return self.settings.controller
-
-    @property
-    def mission(self) -> MissionNodeSettings:
-        """The settings of the mission's node."""
-        return self.settings.mission
-
-    @property
-    def recorder(self) -> RecorderNodeSettings:
-        """The settings of the recorder's node."""
-        return self.settings.recorder
-
-    @property
     def law(self) -> ControlLaw:
         """Law in force at the start."""
         return next(iter(self.laws.values()))
@@ -97,7 +74,7 @@ class ResolvedScenario:
         """Gains that the user set beside those of the set, as ``<law>.<gain>``."""
         return [
             f"{law}.{gain}"
-            for law, gains in self.settings.gains.items()
+            for law, gains in self.gains.items()
             if law in self.laws
             for gain in gains
         ]
@@ -105,12 +82,25 @@ class ResolvedScenario:
     @property
     def has_chosen_gains(self) -> bool:
         """True unless the gains are the default set's."""
-        return self.controller.gains != DEFAULT or bool(self.settings.gains)
+        return self.controller.gains != DEFAULT or bool(self.gains)
 
     @cached_property
     def parameters(self) -> dict[str, dict[str, Any]]:
-        """The parameters of every node over its files, by dotted name."""
-        return self.settings.parameters(self.laws)
+        """All parameters of every node but those that the flight sets at its start, dotted."""
+        parameters = {
+            node: {
+                name: value
+                for name, value in flatten(getattr(self, node).model_dump(mode="json"))
+                if f"{node}.{name}" not in NOT_TO_BE_SET or name in OPTIONS_OF_NODES
+            }
+            for node in NODES
+        }
+        parameters["controller"] |= {
+            f"{name}.{gain}": values.tolist()
+            for name, law in self.laws.items()
+            for gain, values in law.gain_values.items()
+        }
+        return parameters
 
     @property
     def ticks(self) -> int:
@@ -237,7 +227,7 @@ def _parameters(scenario: ResolvedScenario) -> dict[str, Tree]:
     """Settings of the nodes that no other option holds."""
     parameters: dict[str, Tree] = {}
     for node in NODES:
-        settings = getattr(scenario.settings, node)
+        settings = getattr(scenario, node)
         at_start = {name.partition(".")[2] for name in NOT_TO_BE_SET if name.startswith(node)}
         parameters[node] = settings.model_dump(mode="json", exclude=HELD | at_start)
     if (filtered := scenario.controller.filter_settings) is not None:
