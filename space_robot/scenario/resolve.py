@@ -42,7 +42,7 @@ def resolve(plan: Scenario) -> ResolvedScenario:
     plan = _without_nodes(plan)
     settings = FlightSettings.resolve(plan)
     with explained_by("own-robot"):
-        robots = Robots(settings, plan.robot, plan.plant_robot)
+        robots = Robots.read(settings, plan.robot, plan.plant_robot)
     laws = _laws(plan, settings, robots.plant.n + 3)
     scenario = ResolvedScenario(
         **vars(settings),
