@@ -45,7 +45,7 @@ def tuned_set(
     """
     plans = [validate(Scenario, {**options, "case": case}, "options") for case in cases]
     settings = [FlightSettings.resolve(plan) for plan in plans]
-    nominal, reference = Robots(settings[0], plans[0].robot).plant, settings[0].mission
+    nominal, reference = Robots.read(settings[0], plans[0].robot).plant, settings[0].mission
     motion = sampled_reference(nominal, reference)
     if not (motion.joints[:, 1].any() or motion.base[:, 4:].any()):
         raise InputError("the mission moves neither joints nor base: tuning needs a motion")

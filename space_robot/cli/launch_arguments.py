@@ -82,17 +82,17 @@ def _argument(option: click.Option) -> LaunchArgument:
     if separator:
         description += "."
     elif option.is_flag:
-        default = "true" if option.default is True else "false"
+        default = str(option.default is True).lower()
     elif option.show_default:
         default = str(option.default)
+    choices: tuple[str, ...] = ()
     if option.multiple:
         description += " Separate several with spaces."
-    choices = tuple(option.type.choices) if isinstance(option.type, click.Choice) else ()
-    if option.multiple:  # one text with all of them
-        choices = ()
-    if option.is_flag:
-        choices = tuple(_TRUTH)
-    return LaunchArgument(_name(option), description, ("", *choices) if choices else (), default)
+    elif option.is_flag:
+        choices = ("", *_TRUTH)
+    elif isinstance(option.type, click.Choice):
+        choices = ("", *option.type.choices)
+    return LaunchArgument(_name(option), description, choices, default)
 
 
 def _name(option: click.Option) -> str:
@@ -146,7 +146,7 @@ def launched_flight(values: Mapping[str, str], group: str = "") -> LaunchedFligh
     for option in _plan.params:
         if isinstance(option, click.Option) and (text := values.get(_name(option), "")):
             words += _words(option, text)
-    own, of_ros = _of_file(values.get(PARAMS_FILE, ""))
+    own, of_ros = _file_parameters(values.get(PARAMS_FILE, ""))
     words += [
         f"--set={node}.{name}={json.dumps(value)}"
         for node, parameters in own.items()
@@ -165,25 +165,18 @@ def launched_flight(values: Mapping[str, str], group: str = "") -> LaunchedFligh
 
 def _words(option: click.Option, argument: str) -> list[str]:
     if option.is_flag:
-        if _TRUTH[argument.lower()]:
-            return option.opts[:1]
-        return option.secondary_opts[:1]
+        return (option.opts if _TRUTH[argument.lower()] else option.secondary_opts)[:1]
     texts = shlex.split(argument) if option.multiple else [argument]
     return [f"{max(option.opts, key=len)}={text}" for text in texts]
 
 
-def _of_file(file: str) -> tuple[dict[str, dict[str, Any]], dict[str, dict[str, Any]]]:
+def _file_parameters(file: str) -> tuple[dict[str, dict[str, Any]], dict[str, dict[str, Any]]]:
     """Return the parameters of a ROS parameter file by node: those of the flight, and ROS's own."""
     from space_robot_msgs_py.config.files import flatten, is_of_ros, node_parameters
 
-    parameters = {
-        node: dict(flatten(node_parameters(Path(file), node))) if file else {} for node in NODES
-    }
-
-    def only(of_ros: bool) -> dict[str, dict[str, Any]]:
-        return {
-            node: {name: value for name, value in values.items() if is_of_ros(name) == of_ros}
-            for node, values in parameters.items()
-        }
-
-    return only(False), only(True)
+    own: dict[str, dict[str, Any]] = {node: {} for node in NODES}
+    of_ros: dict[str, dict[str, Any]] = {node: {} for node in NODES}
+    for node in NODES if file else ():
+        for name, value in flatten(node_parameters(Path(file), node)):
+            (of_ros if is_of_ros(name) else own)[node][name] = value
+    return own, of_ros

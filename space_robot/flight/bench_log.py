@@ -101,17 +101,15 @@ def flight_of(flight: Flight, history: BenchHistory) -> Flight:
     """
     scenario, width = flight.scenario, len(flight.plant.names.commanded)
     options: dict[str, Any] = {}
-    settings = scenario.settings
-    if history.seed != settings.plant.fault_seed:
+    changes: dict[str, Any] = {}
+    if history.seed != scenario.plant.fault_seed:
         options["seed"] = history.seed
-        plant = settings.plant.model_copy(update={"fault_seed": history.seed})
-        settings = settings._replace(plant=plant)
-    laws, swaps = scenario.laws, scenario.swaps
+        changes["plant"] = scenario.plant.model_copy(update={"fault_seed": history.seed})
     is_by_hand = len(history) and all(len(row) == width for row in history.rows())
     if is_by_hand and scenario.law.name != NoLaw.name:
         options |= {"controller": None, "swaps": []}
-        controller = settings.controller.model_copy(update={"controller": "", "swaps": [""]})
-        settings = settings._replace(controller=controller, gains={})
-        laws, swaps = {NoLaw.name: NoLaw({}, flight.period, flight.robot.n + 3)}, []
-    changed = scenario.options.model_copy(update=options)
-    return Flight(replace(scenario, options=changed, settings=settings, laws=laws, swaps=swaps))
+        controller = scenario.controller.model_copy(update={"controller": "", "swaps": [""]})
+        laws = {NoLaw.name: NoLaw({}, flight.period, flight.robot.n + 3)}
+        changes |= {"controller": controller, "gains": {}, "laws": laws, "swaps": []}
+    changes["options"] = scenario.options.model_copy(update=options)
+    return Flight(replace(scenario, **changes))

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from contextlib import suppress
+from dataclasses import dataclass
 from inspect import isclass
-from typing import Any, NamedTuple
+from typing import Any
 
 from pydantic import ValidationError
 
@@ -16,7 +17,7 @@ from space_robot_control.guidance.mission import (
     MissionSettings,
     pointing_start,
 )
-from space_robot_control.laws import ControlLaw, find_law, importable_name, laws
+from space_robot_control.laws import find_law, importable_name, laws
 from space_robot_control.navigation.settings import assumed_numbers
 from space_robot_model.orbit.ephemeris import AssumedOrbit, AssumedTarget
 from space_robot_model.robot.mission_document import OF_PLANT, document_settings
@@ -65,7 +66,8 @@ OPTIONS_OF_NODES = ("period", "paused")
 """Those among them that options of a flight set."""
 
 
-class FlightSettings(NamedTuple):
+@dataclass(frozen=True)
+class FlightSettings:
     """Settings of every node, and gains given directly by the user."""
 
     plant: PlantNodeSettings
@@ -75,8 +77,8 @@ class FlightSettings(NamedTuple):
     gains: dict[str, Tree]
     """Gains by law, which override the gain set."""
 
-    @classmethod
-    def resolve(cls, scenario: Scenario) -> FlightSettings:
+    @staticmethod
+    def resolve(scenario: Scenario) -> FlightSettings:
         """Resolve settings: options override files, single parameters override both.
 
         Raises:
@@ -92,36 +94,15 @@ class FlightSettings(NamedTuple):
             mission = MissionNodeSettings.resolve(chosen["mission"])
         mission = with_assumed_orbit(mission, plant)
         plant = _at_pointing_start(plant, mission)
-        settings = cls(
-            plant, controller, mission, RecorderNodeSettings.resolve(chosen["recorder"]), gains
-        )
-        settings._check_periods()
-        return settings
-
-    def parameters(self, laws: Mapping[str, ControlLaw]) -> dict[str, dict[str, Any]]:
-        """Return all parameters of every node but those that the flight sets at its start."""
-        parameters = {
-            node: {
-                name: value
-                for name, value in flatten(getattr(self, node).model_dump(mode="json"))
-                if f"{node}.{name}" not in NOT_TO_BE_SET or name in OPTIONS_OF_NODES
-            }
-            for node in NODES
-        }
-        parameters["controller"] |= {
-            f"{name}.{gain}": values.tolist()
-            for name, law in laws.items()
-            for gain, values in law.gain_values.items()
-        }
-        return parameters
-
-    def _check_periods(self) -> None:
-        periods = {node: getattr(self, node).period for node in NODES}
+        recorder = RecorderNodeSettings.resolve(chosen["recorder"])
+        settings = FlightSettings(plant, controller, mission, recorder, gains)
+        periods = {node: getattr(settings, node).period for node in NODES}
         if len(set(periods.values())) > 1:
             said = ", ".join(f"{node} {period:g}" for node, period in periods.items())
             raise InputError(
                 f"the period must be the same for all nodes, got {said} s: use --period"
             )
+        return settings
 
 
 def _controller(

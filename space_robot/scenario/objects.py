@@ -109,7 +109,8 @@ def _law(value: Any) -> Any:
 def _gains(value: Any) -> str | Tree:
     if not isinstance(value, Mapping):
         return _name(value, "a mapping of gains to numbers")
-    return _listed(nest(_plain(value)))
+    gains: Tree = _listed(nest(_plain(value)))
+    return gains
 
 
 def _listed(gains: Any) -> Any:

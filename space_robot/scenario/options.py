@@ -32,6 +32,8 @@ class Option:
     """Folder of config/ with the files, or folders, that can be named."""
     other_names: tuple[str, ...] = ()
     """Names without a file there."""
+    node: str = ""
+    """Node for which alone it is; without meaning where that node is another's."""
     needs_graph: bool = False
     """True if the option applies only to a graph of nodes."""
     is_launched: bool = True
@@ -69,7 +71,10 @@ class Options:
     """Fields of a scenario; a field of type Any is a name, a path or an object."""
 
     controller: Any = option(
-        "Law: {names}, or file.py:Class of your own", "tde_stc", folder="gains/paper/tuned"
+        "Law: {names}, or file.py:Class of your own",
+        "tde_stc",
+        folder="gains/paper/tuned",
+        node="controller",
     )
     """Unless it is set, that of the gain set's ``controller.yaml``, if there is one."""
     case: Any = option("Friction, disturbance and payload: {names}, or a path", "1", folder="cases")
@@ -91,6 +96,7 @@ class Options:
         None,
         default_text="as they are",
         folder="actuators",
+        node="controller",
     )
     orbit: Any = option(
         "Orbit, with gravity gradient, drag, sunlight and magnetic field: {names}, or a path to "
@@ -103,6 +109,7 @@ class Options:
         "default",
         folder="gains/paper",
         other_names=("default",),
+        node="controller",
     )
     robot: Any = option(
         "Robot: {names}, or a path to its YAML, URDF or folder", "paper", folder="robots"
@@ -136,11 +143,16 @@ class Options:
         "What the laws see: the measurements, or the navigation filter's estimates",
         None,
         default_text="direct",
+        node="controller",
     )
     command_latency_ticks: int = option("Ticks by which the plant applies commands late", 0)
     friction: bool = option("Joint friction of the case, or none", True)
     swaps: list[str] = option(
-        "Swap to LAW at T simulated seconds; may be repeated", [], flag="--swap", metavar="T:LAW"
+        "Swap to LAW at T simulated seconds; may be repeated",
+        [],
+        flag="--swap",
+        metavar="T:LAW",
+        node="controller",
     )
     faults: list[str] = option(
         "Inject a fault at T simulated seconds; may be repeated; --fault list lists all kinds",
@@ -162,11 +174,13 @@ class Options:
         "built by the system's compiler (c), or a flight computer at udp:HOST:PORT",
         "python",
         metavar="CODE",
+        node="controller",
     )
     shadow: Literal["none", "c"] = option(
         "Let the C code answer, too, and end the flight with exit code 1 at the first number "
         "that differs",
         "none",
+        node="controller",
     )
     realtime: bool = option("Pace by the wall clock instead of lockstep", False, needs_graph=True)
     paused: bool = option(
@@ -206,7 +220,11 @@ class Options:
         high=1e6,
     )
     restart_controller: bool = option(
-        "Restart a controller that died or hangs", False, needs_graph=True, is_launched=False
+        "Restart a controller that died or hangs",
+        False,
+        needs_graph=True,
+        is_launched=False,
+        node="controller",
     )
     domain: int | None = option(
         "ROS domain",

@@ -24,6 +24,7 @@ from .disturbances import sampled
 from .faults import KINDS, NODE_OF, PROCESS_KINDS
 from .node_settings import FlightSettings, option_parameters
 from .objects import resolve_law
+from .options import OPTIONS
 from .resolved import ResolvedScenario
 from .robots import Robots
 from .scenario import Scenario
@@ -41,21 +42,21 @@ def resolve(plan: Scenario) -> ResolvedScenario:
     plan = _without_nodes(plan)
     settings = FlightSettings.resolve(plan)
     with explained_by("own-robot"):
-        robots = Robots(settings, plan.robot, plan.plant_robot)
+        robots = Robots.read(settings, plan.robot, plan.plant_robot)
     laws = _laws(plan, settings, robots.plant.n + 3)
     scenario = ResolvedScenario(
-        plan,
-        settings,
-        settings.mission.mission or robot_files(settings.mission.robot).name,
-        robots,
-        _mission(settings, robots.controller),
-        laws,
-        [
+        **vars(settings),
+        options=plan,
+        mission_name=settings.mission.mission or robot_files(settings.mission.robot).name,
+        robots=robots,
+        reference=_mission(settings, robots.controller),
+        laws=laws,
+        swaps=[
             (tick, laws[one_of(name, laws, "controller", " of swaps")])
             for tick, name in parse_swaps(settings.controller.swaps, settings.plant.period)
         ],
-        _assumed_actuators(plan, settings, robots.controller),
-        _process_faults(plan),
+        assumed_actuators=_assumed_actuators(plan, settings, robots.controller),
+        process_faults=_process_faults(plan),
     )
     _check_composed(plan)
     _check_disturbance(plan, scenario)
@@ -68,13 +69,11 @@ def _with_sampled_disturbance(scenario: ResolvedScenario) -> ResolvedScenario:
 
     A function could not go to another process, and nobody could repeat its flight.
     """
-    options, settings = scenario.options, scenario.settings
-    columns = sampled(options.disturbance, scenario.ticks * scenario.plant.period)
-    plant = settings.plant.with_table(DisturbanceTable(columns).text)
+    columns = sampled(scenario.options.disturbance, scenario.ticks * scenario.plant.period)
     return replace(
         scenario,
-        options=options.model_copy(update={"disturbance": columns}),
-        settings=settings._replace(plant=plant),
+        options=scenario.options.model_copy(update={"disturbance": columns}),
+        plant=scenario.plant.with_table(DisturbanceTable(columns).text),
     )
 
 
@@ -130,16 +129,6 @@ def _assumed_actuators(
     return assumed
 
 
-OF_NODES = {
-    "controller": (
-        *("controller", "gains", "assumed_actuators", "navigation", "swaps"),
-        *("controller_code", "shadow", "restart_controller"),
-    ),
-    "mission": (),
-}
-"""Options that say nothing where a node is another's."""
-
-
 def _without_nodes(plan: Scenario) -> Scenario:
     """Check what is asked of nodes that are not started; a flight without controller has no law.
 
@@ -149,8 +138,8 @@ def _without_nodes(plan: Scenario) -> Scenario:
     for node in plan.without:
         asked = [
             name
-            for name in OF_NODES[node]
-            if getattr(plan, name) not in (Scenario.model_fields[name].default, None, [])
+            for name, option in OPTIONS.items()
+            if option.node == node and getattr(plan, name) not in (option.default, None)
         ]
         asked += [f"{node}.{name}" for name in plan.parameters.get(node, {})]
         faults = parse_faults(plan.faults_of(PROCESS_KINDS), KINDS)

@@ -3,25 +3,22 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
 from pydantic import BaseModel
 
-from space_robot_control.allocation.settings import AllocationSettings
 from space_robot_control.controller.law_choice import NoLaw
-from space_robot_control.controller.settings import DEFAULT, ControllerNodeSettings
-from space_robot_control.guidance.mission import Mission, MissionNodeSettings, MissionSettings
+from space_robot_control.controller.settings import DEFAULT
+from space_robot_control.guidance.mission import Mission, MissionSettings
 from space_robot_control.laws import ControlLaw
-from space_robot_model.hardware.base_actuators import BaseActuatorSettings, MagneticTorquerSettings
+from space_robot_model.hardware.base_actuators import BaseActuatorSettings
 from space_robot_model.hardware.sensors import SensorSettings
-from space_robot_msgs_py.bag.recorder import RecorderNodeSettings
-from space_robot_msgs_py.config.files import Tree
+from space_robot_msgs_py.config.files import Tree, flatten
 from space_robot_msgs_py.errors import InputError
 from space_robot_sim.actuators.actuators import ActuatorSettings
-from space_robot_sim.environment.disturbance import DisturbanceSettings
 from space_robot_sim.environment.disturbance_table import DisturbanceTable
 from space_robot_sim.environment.environment import EnvironmentSettings
 from space_robot_sim.environment.friction import coefficients
@@ -29,38 +26,17 @@ from space_robot_sim.environment.orbit import OrbitSettings
 from space_robot_sim.faults.grammar import Fault
 from space_robot_sim.plant.plant import Plant
 from space_robot_sim.plant.report import actuators, plant_description
-from space_robot_sim.plant.settings import MOST_TICKS, PLANT_KINDS, PlantNodeSettings
+from space_robot_sim.plant.settings import MOST_TICKS, PLANT_KINDS
 
 from .faults import PROCESS_KINDS
-from .node_settings import NODES, NOT_TO_BE_SET, FlightSettings
+from .node_settings import NODES, NOT_TO_BE_SET, OPTIONS_OF_NODES, FlightSettings
+from .options import OPTIONS
 from .robots import Robots
 from .scenario import Scenario
 
-SECTIONS: Mapping[str, type[BaseModel]] = {
-    "case": EnvironmentSettings,
-    "sensors": SensorSettings,
-    "actuators": ActuatorSettings,
-    "orbit": OrbitSettings,
-}
-"""Options that hold numbers of the plant; an orbit only where there is one."""
-BY_THE_MISSION = ("initial_joints_deg", "initial_quaternion", "initial_rate_deg_s")
-"""Options that a mission sets for the plant."""
-OF_PLANT = ("period", "substeps", "command_latency_ticks")
-OF_THE_GRAPH = ("realtime", "paused", "fifo_priority")
-"""Options of the plant's node; options of the graph only where they are set."""
-OF_THE_CODE = ("controller_code", "shadow")
-"""Parameters of the controller's node that change no number; options only where they are set."""
-ROBOTS = ("robot", "plant_robot")
-"""Options recorded in a bag as ``robot_file`` and ``controller_robot_file``."""
-LABELS = (
-    *("robot", "mission", "case", "sensors", "actuators", "orbit", "gains"),
-    "navigation_sensors",
-)
-"""Names of files, which the numbers replace."""
-
 
 @dataclass(frozen=True)
-class ResolvedScenario:
+class ResolvedScenario(FlightSettings):
     """Complete definition of a flight, made by `space_robot.scenario.resolve.resolve`.
 
     The settings are decisive, not the options: single parameters override options.
@@ -68,8 +44,6 @@ class ResolvedScenario:
 
     options: Scenario
     """Options as the user wrote them."""
-    settings: FlightSettings
-    """Settings of every node."""
     mission_name: str
     """Name of the mission's file; the robot's name if the mission belongs to the robot."""
     robots: Robots
@@ -86,26 +60,6 @@ class ResolvedScenario:
     """Faults of the nodes' processes; faults of the plant are in its settings."""
 
     @property
-    def plant(self) -> PlantNodeSettings:
-        """The settings of the plant's node."""
-        return self.settings.plant
-
-    @property
-    def controller(self) -> ControllerNodeSettings:
-        """The settings of the controller's node."""
-        return self.settings.controller
-
-    @property
-    def mission(self) -> MissionNodeSettings:
-        """The settings of the mission's node."""
-        return self.settings.mission
-
-    @property
-    def recorder(self) -> RecorderNodeSettings:
-        """The settings of the recorder's node."""
-        return self.settings.recorder
-
-    @property
     def law(self) -> ControlLaw:
         """Law in force at the start."""
         return next(iter(self.laws.values()))
@@ -120,7 +74,7 @@ class ResolvedScenario:
         """Gains that the user set beside those of the set, as ``<law>.<gain>``."""
         return [
             f"{law}.{gain}"
-            for law, gains in self.settings.gains.items()
+            for law, gains in self.gains.items()
             if law in self.laws
             for gain in gains
         ]
@@ -128,12 +82,25 @@ class ResolvedScenario:
     @property
     def has_chosen_gains(self) -> bool:
         """True unless the gains are the default set's."""
-        return self.controller.gains != DEFAULT or bool(self.settings.gains)
+        return self.controller.gains != DEFAULT or bool(self.gains)
 
     @cached_property
     def parameters(self) -> dict[str, dict[str, Any]]:
-        """The parameters of every node over its files, by dotted name."""
-        return self.settings.parameters(self.laws)
+        """All parameters of every node but those that the flight sets at its start, dotted."""
+        parameters = {
+            node: {
+                name: value
+                for name, value in flatten(getattr(self, node).model_dump(mode="json"))
+                if f"{node}.{name}" not in NOT_TO_BE_SET or name in OPTIONS_OF_NODES
+            }
+            for node in NODES
+        }
+        parameters["controller"] |= {
+            f"{name}.{gain}": values.tolist()
+            for name, law in self.laws.items()
+            for gain, values in law.gain_values.items()
+        }
+        return parameters
 
     @property
     def ticks(self) -> int:
@@ -180,7 +147,14 @@ class ResolvedScenario:
         It is a mapping of options as `Scenario` takes them, so that a printed one can be flown.
         Equal trees fly equal bits.
         """
-        return _tree(self)
+        tree = {name: number(self) for name, number in NUMBERS.items()}
+        options = {name: getattr(self.options, name) for name in OPTIONS.keys() - HIDDEN}
+        optional = options | {name: number(self) for name, number in OPTIONAL.items()}
+        return tree | {
+            name: optional[name]
+            for name, option in OPTIONS.items()
+            if name not in NUMBERS and optional.get(name, option.default) != option.default
+        }
 
     def description(self, plant: Plant) -> dict[str, Any]:
         """Return the description kept in a bag, sufficient to repeat the flight.
@@ -210,119 +184,111 @@ class ResolvedScenario:
             **({"restart_controller": True} if self.options.restart_controller else {}),
             **({"without": list(self.options.without)} if self.options.without else {}),
             "parameters": self.parameters,
-            "scenario": {k: v for k, v in self.tree.items() if k not in ROBOTS},
+            "scenario": {k: v for k, v in self.tree.items() if k not in ("robot", "plant_robot")},
             "gains_used": self.gains_used,
             **robots,
         }
 
 
-def _tree(scenario: ResolvedScenario) -> dict[str, Any]:
-    settings, laws = scenario.settings, scenario.laws
-    plant, controller = settings.plant, settings.controller
-    numbers = _numbers(plant)
-    sections = {
-        option: {k: numbers[k] for k in schema.model_fields if k not in _ELSEWHERE and k in numbers}
-        for option, schema in SECTIONS.items()
-        if option != "orbit" or plant.has_orbit
+def _gains(scenario: ResolvedScenario) -> Tree:
+    return {
+        name: {gain: values.tolist() for gain, values in law.gain_values.items()}
+        for name, law in scenario.laws.items()
+        if name != NoLaw.name and law.gain_values
     }
-    disturbance: Tree = {}
-    if text := sections["case"]["disturbance"].pop("table", ""):
-        disturbance = {"disturbance": DisturbanceTable.parse(text).columns}
-    of_mission = {*MissionSettings.model_fields}
+
+
+def _mission(scenario: ResolvedScenario) -> Tree:
+    own = {*MissionSettings.model_fields}
     if not scenario.reference.uses_orbit:
-        of_mission.remove("assumed_orbit")
-    mission = _without_defaults(settings.mission.model_dump(mode="json", include=of_mission))
-    navigation: Tree = {}
-    if (filtered := controller.filter_settings) is not None:
-        navigation = {"navigation_filter": filtered.model_dump(mode="json")}
-    own = _numbers(scenario.assumed_actuators)
-    differs = own != {key: sections["actuators"].get(key) for key in own}
-    events = [text for text in plant.events if text.strip()]
-    return {
-        "controller": controller.controller,
-        "gains": {
-            name: {gain: values.tolist() for gain, values in law.gain_values.items()}
-            for name, law in laws.items()
-            if name != NoLaw.name and law.gain_values
-        },
-        **scenario.robots.options,
-        "mission": {**mission, **_some(numbers, BY_THE_MISSION)},
-        "events": events,
-        **sections,
-        **disturbance,
-        **({"assumed_actuators": own} if differs else {}),
-        "duration": scenario.ticks * plant.period,
-        **{name: numbers[name] for name in OF_PLANT},
-        "navigation": controller.navigation,
-        "seed": plant.fault_seed,
-        **({"faults": list(scenario.faults)} if scenario.faults else {}),
-        **({"swaps": scenario.swap_texts} if scenario.swap_texts else {}),
-        **{name: numbers[name] for name in OF_THE_GRAPH if numbers[name]},
-        **{
-            name: getattr(controller, name)
-            for name in OF_THE_CODE
-            if getattr(controller, name) != ControllerNodeSettings.model_fields[name].default
-        },
-        **({"restart_controller": True} if scenario.options.restart_controller else {}),
-        **({"without": list(scenario.options.without)} if scenario.options.without else {}),
-        "parameters": {
-            node: {
-                **_rest(node, getattr(settings, node)),
-                **(navigation if node == "controller" else {}),
-            }
-            for node in NODES
-        },
-    }
+        own.remove("assumed_orbit")
+    start = scenario.plant.model_dump(mode="json", include={*START})
+    return scenario.mission.model_dump(mode="json", include=own) | start
 
 
-def _some(numbers: Tree, keys: Iterable[str]) -> Tree:
-    return {key: numbers[key] for key in keys if key in numbers}
+def _plant_numbers(schema: type[BaseModel]) -> Callable[[ResolvedScenario], Tree]:
+    own = {*schema.model_fields} - {"events", *SAME_IN_PLANT}
+    table = {"disturbance": {"table"}}  # an option of its own
+    return lambda scenario: scenario.plant.model_dump(mode="json", include=own, exclude=table)
 
 
-_ELSEWHERE = ("events", *OF_PLANT)
+def _disturbance(scenario: ResolvedScenario) -> Tree | str:
+    text = scenario.plant.disturbance.table
+    return DisturbanceTable.parse(text).columns if text else ""
 
 
-def _rest(node: str, settings: BaseModel) -> dict[str, Any]:
-    """Settings of a node that are not in another option of the tree."""
-    held = {
-        *(key for schema in SECTIONS.values() for key in schema.model_fields),
-        *MissionSettings.model_fields,
-        *BY_THE_MISSION,
-        *OF_PLANT,
-        *OF_THE_GRAPH,
-        *OF_THE_CODE,
-        *LABELS,
-        "controller",
-        "swaps",
-        "navigation",
-        "navigation_filter",
-        "faults",
-        "fault_seed",
-        *(name.partition(".")[2] for name in NOT_TO_BE_SET if name.startswith(f"{node}.")),
-    }
-    return {key: value for key, value in _numbers(settings).items() if key not in held}
+def _assumed_actuators(scenario: ResolvedScenario) -> Tree | None:
+    assumed = scenario.assumed_actuators.model_dump(mode="json")
+    true = scenario.plant.model_dump(mode="json", include={*assumed})
+    return None if assumed == true else assumed
 
 
-_LATER: Mapping[str, Any] = {
-    "base_topics_rate": PlantNodeSettings.model_fields["base_topics_rate"].default,
-    "initial_rate_deg_s": [0.0, 0.0, 0.0],
-    "base_rate_deg_s": [0.0, 0.0, 0.0],
-    "base_point": "",
-    "magnetic_torquers": MagneticTorquerSettings().model_dump(mode="json"),
-    **{key: AllocationSettings.model_fields[key].default for key in ("dump", "magnetic_gain")},
-    **{key: DisturbanceSettings.model_fields[key].default for key in ("table", "table_scale")},
+def _parameters(scenario: ResolvedScenario) -> dict[str, Tree]:
+    """Settings of the nodes that no other option holds."""
+    parameters: dict[str, Tree] = {}
+    for node in NODES:
+        settings = getattr(scenario, node)
+        at_start = {name.partition(".")[2] for name in NOT_TO_BE_SET if name.startswith(node)}
+        parameters[node] = settings.model_dump(mode="json", exclude=HELD | at_start)
+    if (filtered := scenario.controller.filter_settings) is not None:
+        parameters["controller"]["navigation_filter"] = filtered.model_dump(mode="json")
+    return parameters
+
+
+def _plant(name: str) -> Callable[[ResolvedScenario], Any]:
+    return lambda scenario: getattr(scenario.plant, name)
+
+
+def _controller(name: str) -> Callable[[ResolvedScenario], Any]:
+    return lambda scenario: getattr(scenario.controller, name)
+
+
+SECTIONS: Mapping[str, type[BaseModel]] = {
+    "case": EnvironmentSettings,
+    "sensors": SensorSettings,
+    "actuators": ActuatorSettings,
+    "orbit": OrbitSettings,
 }
-"""Settings that flights of earlier releases did not have, with their defaults. At these they are
-left out, so that the digest of a flight without them stays."""
-
-
-def _numbers(settings: BaseModel) -> Tree:
-    return _without_defaults(settings.model_dump(mode="json"))
-
-
-def _without_defaults(tree: Tree) -> Tree:
-    return {
-        key: _without_defaults(value) if isinstance(value, dict) else value
-        for key, value in tree.items()
-        if key not in _LATER or value != _LATER[key]
-    }
+"""Options that hold numbers of the plant."""
+START = ("initial_joints_deg", "initial_quaternion", "initial_rate_deg_s")
+"""Settings of the plant that its mission holds."""
+SAME_IN_PLANT = ("period", "substeps", "command_latency_ticks")
+NUMBERS: Mapping[str, Callable[[ResolvedScenario], Any]] = {
+    "controller": _controller("controller"),
+    "gains": _gains,
+    "robot": lambda scenario: scenario.robots.options["robot"],
+    "mission": _mission,
+    "events": lambda scenario: [text for text in scenario.plant.events if text.strip()],
+    **{name: _plant_numbers(SECTIONS[name]) for name in ("case", "sensors", "actuators")},
+    "duration": lambda scenario: scenario.ticks * scenario.plant.period,
+    **{name: _plant(name) for name in SAME_IN_PLANT},
+    "navigation": _controller("navigation"),
+    "seed": _plant("fault_seed"),
+    "parameters": _parameters,
+}
+"""The resolved value of each option."""
+OPTIONAL: Mapping[str, Callable[[ResolvedScenario], Any]] = {
+    "plant_robot": lambda scenario: scenario.robots.options.get("plant_robot"),
+    "orbit": lambda scenario: (
+        _plant_numbers(OrbitSettings)(scenario) if scenario.plant.has_orbit else "none"
+    ),
+    "disturbance": _disturbance,
+    "assumed_actuators": _assumed_actuators,
+    "faults": lambda scenario: list(scenario.faults),
+    "swaps": lambda scenario: scenario.swap_texts,
+    **{name: _plant(name) for name in ("realtime", "paused", "fifo_priority")},
+    **{name: _controller(name) for name in ("controller_code", "shadow")},
+}
+"""Of options that are left out at their defaults; those not named here are as they were given."""
+HIDDEN = {
+    *("friction", "compression", "split_size"),  # in the case, and in the recorder's parameters
+    *("namespace", "composed", "domain", "join_timeout"),  # where, and not what, is flown
+}
+HELD = {
+    *(OPTIONS.keys() - HIDDEN),
+    *(name for schema in SECTIONS.values() for name in schema.model_fields),
+    *MissionSettings.model_fields,
+    *START,
+    *("fault_seed", "navigation_filter", "navigation_sensors"),
+}
+"""Settings of nodes that an option holds."""

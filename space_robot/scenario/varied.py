@@ -82,7 +82,8 @@ def varied(nominal: ResolvedScenario, variation: Variation) -> ResolvedScenario 
     return replace(
         nominal,
         options=options,
-        settings=nominal.settings._replace(plant=plant, gains=merge(nominal.settings.gains, gains)),
+        plant=plant,
+        gains=merge(nominal.gains, gains),
         robots=robots.with_plant(variation.plant_robot) if variation.plant_robot else robots,
         laws=laws,
         swaps=[(tick, laws[law.name]) for tick, law in nominal.swaps],
