@@ -122,7 +122,8 @@ def change_laws(domain: int) -> None:
         assert pilot.set(controller="tde_stc") == [True]
         pilot.step(400)
         assert pilot.law() == "tde_smc", "the parameter tells the law after a planned swap"
-        pilot.step_until(lambda: pilot.value("plant", "missed_deadlines") >= 250, 400, "silence")
+        # long enough that the controller dies, and is missed, before the next one is there
+        pilot.step_until(lambda: pilot.value("plant", "missed_deadlines") >= 250, 2000, "silence")
         dead = pilot.value("plant", "tick")
         pilot.step_until(lambda: pilot.value("controller", "tick") > dead, 20, "the next one")
         pilot.step(400)
