@@ -57,7 +57,7 @@ setup(
         "space_robot.campaign.report": ["templates/*.j2"],
         "space_robot.cli": ["templates/*.txt"],
         "space_robot.help": ["*.md"],
-        "space_robot.paper.reproduction": ["templates/*.j2"],
+        "space_robot.paper": ["templates/*.j2"],
         "space_robot.view": ["templates/*"],
         "space_robot_control.flight_code": ["templates/*.j2"],
         "space_robot_msgs_py.ros": ["*.xml"],

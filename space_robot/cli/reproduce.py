@@ -72,13 +72,13 @@ def reproduce(
 
     from ..console.progress import counting_progress
     from ..flight.compilation import compile_kernels
-    from ..paper.reproduction.flights import ROWS, Equipment, TableRow
-    from ..paper.reproduction.reproduce import check_folder
-    from ..paper.reproduction.reproduce import reproduce as run
+    from ..paper.flights import ROWS, Equipment, TableRow
+    from ..paper.reproduce import check_results_folder
+    from ..paper.reproduce import reproduce as run
     from ..processes.pool import cores
 
     rows = [TableRow.parse(text) for text in dict.fromkeys(only)] or list(ROWS)
-    check_folder(out)
+    check_results_folder(out)
     named_file("sensors", sensors)
     named_file("actuators", actuators)
     compile_kernels(actuators not in ("ideal", "none"))
@@ -101,7 +101,7 @@ def reproduce(
 def _summary(record: dict[str, Any], out: Path) -> None:
     from ..console.terminal import say, terminal
     from ..console.terminal_tables import print_table
-    from ..paper.reproduction.claims import claims_table
+    from ..paper.comparison import claims_table
 
     console = terminal()
     if record["claims"]:

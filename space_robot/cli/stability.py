@@ -48,8 +48,8 @@ def stability(initial_error: float, as_json: bool, plot: Path | None, **options:
     from ..console.terminal import echo_json, terminal
     from ..flight.compilation import compile_kernels
     from ..flight.plan import Scenario
-    from ..paper.stability import report, study
-    from ..paper.stability.display import print_study
+    from ..paper.stability import study
+    from ..paper.stability_report import print_study, report
 
     plan = validate(Scenario, options, "options")
     if plot:
@@ -57,7 +57,7 @@ def stability(initial_error: float, as_json: bool, plot: Path | None, **options:
     compile_kernels()
     proofs = study(plan, initial_error, _fly)
     if plot:
-        from ..paper.stability.figures import draw
+        from ..paper.stability_figures import draw
 
         written = draw(proofs, plot)
         names = ", ".join(map(str, written)) or "nothing: the figures are of K_1 and K_2"

@@ -9,10 +9,9 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from ...analysis.figures.style import COLOURS, GREY, grid, house_style, page, plain, save_figure
-from .circle_criterion import transfer_function
-from .study import StabilityStudy
-from .super_twisting import SuperTwisting
+from ..analysis.figures.style import COLOURS, GREY, grid, house_style, page, plain, save_figure
+from .lyapunov import transfer_function
+from .stability import StabilityStudy, SuperTwisting
 
 BLACK, BLUE, ORANGE = COLOURS[0], COLOURS[2], COLOURS[6]
 POINTS = 1500
@@ -39,15 +38,16 @@ def nyquist(twisting: SuperTwisting, names: tuple[str, ...]) -> Figure:
     the axes with these gains.
     """
     groups: dict[tuple[float, float], list[int]] = {}
-    for axis, gains in enumerate(twisting.gains):
-        if min(gains) > 0.0:
-            groups.setdefault(gains, []).append(axis)
+    for number, axis in enumerate(twisting.axes):
+        if min(axis.k_1, axis.k_2) > 0.0:
+            groups.setdefault((axis.k_1, axis.k_2), []).append(number)
     columns = max(1, min(2, len(groups)))
     figure = page(14.0 + 78.0 * max(1, math.ceil(len(groups) / columns)))
     panels = grid(figure, len(groups), columns, shared=False)
     for panel, (gains, axes) in zip(panels, groups.items(), strict=True):
-        tolerated, measured = twisting.tolerated_beta[axes[0]], np.min(twisting.beta[axes])
-        _nyquist_panel(panel, gains, float(tolerated), float(measured))
+        tolerated = twisting.axes[axes[0]].tolerated_beta
+        measured = min(twisting.axes[axis].beta for axis in axes)
+        _nyquist_panel(panel, gains, tolerated, measured)
         panel.set_title(
             f"{plain(', '.join(names[axis] for axis in axes))}\n"
             rf"$\beta$ tolerated {tolerated:.3g}, measured {measured:.3g} or more"
@@ -64,25 +64,18 @@ def _nyquist_panel(
     half = np.geomspace(1e-3, 1e3, POINTS) * math.sqrt(gains[1] / 2.0)
     g = transfer_function(*gains, np.concatenate([-half[::-1], half]))
     angle = np.linspace(0.0, 2.0 * np.pi, 361)
-    circles = [(tolerated, "--", BLUE, r"radius 1/$\beta$, $\beta$ tolerated")]
+    x, y = np.cos(angle), np.sin(angle)
+    label = r"radius 1/$\beta$, $\beta$ tolerated"
+    panel.plot(x / tolerated, y / tolerated, "--", color=BLUE, label=label, linewidth=1.0)
     if measured > 0.0:
-        circles.append((measured, "-", ORANGE, r"radius 1/$\beta$, $\beta$ measured"))
-    for beta, dashes, colour, label in circles:
-        panel.plot(
-            np.cos(angle) / beta,
-            np.sin(angle) / beta,
-            dashes,
-            color=colour,
-            label=label,
-            linewidth=1.6 if dashes == "-" else 1.0,
-        )
+        label = r"radius 1/$\beta$, $\beta$ measured"
+        panel.plot(x / measured, y / measured, color=ORANGE, label=label, linewidth=1.6)
     panel.plot(g.real, g.imag, color=BLACK, label=r"$G(j\omega)$, all $\omega$")
     if measured > 0.0:  # its circle may be too small to be visible
         panel.plot(0.0, 0.0, "o", color=ORANGE, markersize=3.0)
     panel.set_aspect("equal")
     reach = 1.1 / tolerated
-    panel.set_xlim(-reach, reach)
-    panel.set_ylim(-reach, reach)
+    panel.set(xlim=(-reach, reach), ylim=(-reach, reach))
     panel.locator_params(nbins=5)
 
 
@@ -95,46 +88,26 @@ def lyapunov(twisting: SuperTwisting, names: tuple[str, ...]) -> Figure:
     """
     figure = page(14.0 + 46.0 * math.ceil(len(names) / 3))
     panels = grid(figure, len(names), 3, shared=False)
-    reaching = twisting.reaching
-    steps = np.unique(np.geomspace(1, len(reaching.time) - 1, POINTS).astype(int))
-    rows = zip(
-        panels,
-        names,
-        twisting.certificates,
-        twisting.measured_certificates,
-        twisting.reaching_time,
-        strict=True,
-    )
-    for axis, (panel, name, certificate, measured, check) in enumerate(rows):
+    time, eta = twisting.reaching.time, twisting.reaching.eta
+    steps = np.unique(np.geomspace(1, len(time) - 1, POINTS).astype(int))
+    for number, (panel, name, axis) in enumerate(zip(panels, names, twisting.axes, strict=True)):
         panel.set_title(plain(name))
-        if certificate is None:
-            panel.text(0.5, 0.5, "no solution of (51)", ha="center", transform=panel.transAxes)
-            continue
-        value = certificate.value(reaching.eta[:, axis])
+        certificate, check = axis.certificate, axis.reaching_time
+        value = certificate.value(eta[:, number]) if certificate else np.zeros(1)
         start = float(value[0])
-        if start == 0.0:
-            panel.text(0.5, 0.5, "V(0) = 0", ha="center", transform=panel.transAxes)
+        if certificate is None or start == 0.0:
+            text = "no solution of (51)" if certificate is None else "V(0) = 0"
+            panel.text(0.5, 0.5, text, ha="center", transform=panel.transAxes)
             continue
-        time = np.geomspace(reaching.time[1], 0.999 * check.limit, POINTS)
-        panel.loglog(
-            reaching.time[steps],
-            np.maximum.reduceat(value, steps) / start,
-            color=BLUE,
-            linewidth=0.7,
-            label="measured",
-        )
-        which = "measured" if measured else "assumed"
-        panel.loglog(
-            time,
-            certificate.bound(start, time) / start,
-            "--",
-            color=ORANGE,
-            label=rf"bound (55) for the {which} $\beta$",
-        )
+        peaks = np.maximum.reduceat(value, steps) / start
+        panel.loglog(time[steps], peaks, color=BLUE, linewidth=0.7, label="measured")
+        until = np.geomspace(time[1], 0.999 * check.limit, POINTS)
+        label = rf"bound (55) for the {'measured' if axis.measured else 'assumed'} $\beta$"
+        bound = certificate.bound(start, until) / start
+        panel.loglog(until, bound, "--", color=ORANGE, label=label)
         if math.isfinite(check.value):
             panel.axvline(check.value, color=GREY, linestyle=":", label="|s| reached")
-        panel.set_ylim(1e-8, 1e3)
-        panel.set_xlim(reaching.time[1], None)
+        panel.set(ylim=(1e-8, 1e3), xlim=(time[1], None))
         panel.minorticks_off()
     figure.supxlabel("time (s)")
     figure.supylabel("V(t) / V(0) (dimensionless)")

@@ -3,19 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 from space_robot_control.controller.settings import DEFAULT, gain_files
 from space_robot_control.navigation.settings import NavigationMode
 from space_robot_msgs_py.errors import DivergedError, InputError
 
-from ...analysis.figures import control_results
-from ...analysis.figures.figure_set import FigureFolder
-from ...analysis.figures.flight_curves import BaseTorque
-from ...analysis.measure import measure
-from ...flight.plan import Flight, Scenario, resolve
-from ...flight.simulate import simulate
+from ..analysis.figures import control_results
+from ..analysis.figures.figure_set import FigureFolder
+from ..analysis.figures.flight_curves import BaseTorque
+from ..analysis.measure import measure
+from ..flight.plan import Flight, Scenario, resolve
+from ..flight.simulate import simulate
 from .table_v import COLUMNS, PRINTED, TORQUE
 
 ROBOT = "paper"
@@ -26,8 +25,7 @@ COMPARED_CASE = "1"
 """The case in which the laws are compared."""
 
 
-@dataclass(frozen=True)
-class Variant:
+class Variant(NamedTuple):
     """Choices that Table V leaves open: the gain set, and joint friction on or off."""
 
     gains: str
@@ -43,8 +41,7 @@ VARIANTS = tuple(Variant(g, f) for g in ("printed", "tuned") for f in (True, Fal
 AS_PRINTED = VARIANTS[0]
 
 
-@dataclass(frozen=True)
-class TableRow:
+class TableRow(NamedTuple):
     """A row of Table V."""
 
     controller: str
@@ -57,11 +54,12 @@ class TableRow:
         Raises:
             InputError: Table V has no such row.
         """
-        row = cls(*text.partition("/")[::2])
-        if (row.controller, row.case) not in PRINTED:
-            names = ", ".join(f"{controller}/{case}" for controller, case in PRINTED)
-            raise InputError(f"Table V has no row {text!r}: choose from {names}")
-        return row
+        controller, _, case = text.partition("/")
+        if (controller, case) not in PRINTED:
+            raise InputError(
+                f"Table V has no row {text!r}: choose from {', '.join(map('/'.join, PRINTED))}"
+            )
+        return cls(controller, case)
 
     @property
     def stem(self) -> str:
@@ -74,51 +72,34 @@ class TableRow:
         return Variant(gain_files(ROBOT, DEFAULT)[self.controller].parent.name, True)
 
 
-ROWS = tuple(TableRow(controller, case) for controller, case in PRINTED)
+ROWS = tuple(TableRow(*row) for row in PRINTED)
 
 
 class Equipment(NamedTuple):
-    """Sensors, navigation and actuators; Table V assumes ideal ones."""
+    """Sensors, navigation and actuators, as options of a flight; Table V assumes ideal ones."""
 
     sensors: str = "ideal"
-    """Name of a file in config/sensors, or a path."""
     navigation: NavigationMode = "direct"
     actuators: str = "ideal"
-    """Name of a file in config/actuators, or a path."""
 
 
 PERFECT = Equipment()
 
 
-class Planned(NamedTuple):
-    """A row in one variant."""
-
-    row: TableRow
-    variant: Variant
-    shown: bool
-    """True if it is drawn: default gains, printed friction."""
-
-    @property
-    def compared(self) -> bool:
-        """True for the flight that represents its law in the comparison figures."""
-        return self.shown and self.row.case == COMPARED_CASE
-
-
-def plan(rows: Iterable[TableRow], brief: bool = False) -> Iterator[Planned]:
+def plan(rows: Iterable[TableRow], brief: bool = False) -> Iterator[tuple[TableRow, Variant]]:
     """Yield the flights of ``rows``: all four variants, or (``brief``) those needed for Table V.
 
     These are the default gains with and without friction and, where they differ from the printed
     gains, the printed gains with the printed friction: the paper's own description.
     """
     for row in rows:
-        shown = row.shown
+        default = row.shown.gains
         for variant in VARIANTS:
-            if not brief or variant.gains == shown.gains or variant == AS_PRINTED:
-                yield Planned(row, variant, variant == shown)
+            if not brief or variant.gains == default or variant == AS_PRINTED:
+                yield row, variant
 
 
-@dataclass(frozen=True)
-class Result:
+class Result(NamedTuple):
     """Results of a flight."""
 
     row: TableRow
@@ -129,7 +110,7 @@ class Result:
     metrics: dict[str, float] | None = None
     """RMS values and chatter of the columns; None if the flight diverged."""
     base_torque: BaseTorque | None = None
-    """Base torque over time, only of compared flights."""
+    """Base torque over time, only of the shown flights of the compared case."""
 
     @property
     def chatters(self) -> bool:
@@ -139,50 +120,41 @@ class Result:
 
 
 def fly(
-    planned: Planned,
-    duration: float | None,
-    figures: FigureFolder | None,
+    row: TableRow,
+    variant: Variant,
+    duration: float | None = None,
+    figures: FigureFolder | None = None,
     equipment: Equipment = PERFECT,
 ) -> Result:
-    """Fly one row in one variant; draw it into ``figures`` if it is a shown one."""
-    row, variant, _ = planned
-    flight = Flight(
-        resolve(
-            Scenario(
-                controller=row.controller,
-                case=row.case,
-                gains=variant.gains,
-                robot=ROBOT,
-                friction=variant.friction,
-                duration=duration,
-                sensors=equipment.sensors,
-                actuators=equipment.actuators,
-                navigation=None if equipment.navigation == "direct" else equipment.navigation,
-            )
-        )
+    """Fly one row in one variant; draw it into ``figures`` if it is `TableRow.shown`."""
+    options = Scenario(
+        controller=row.controller,
+        case=row.case,
+        gains=variant.gains,
+        robot=ROBOT,
+        friction=variant.friction,
+        duration=duration,
+        sensors=equipment.sensors,
+        actuators=equipment.actuators,
+        navigation=None if equipment.navigation == "direct" else equipment.navigation,
     )
-    flown = parameters(flight)
+    flight = Flight(resolve(options))
+    parameters = _parameters(flight)
     try:
         log = simulate(flight)
     except DivergedError as error:
-        return Result(row, variant, flown, error.tick)
-    if planned.shown and figures is not None:
+        return Result(row, variant, parameters, error.tick)
+    is_shown = variant == row.shown
+    if is_shown and figures is not None:
         title = f"{row.controller}, case {row.case}: {variant.title}"
         figures.save(control_results(log, title), row.stem)
     wanted = [f"{column}.{statistic}" for statistic in DEFINITIONS for column in COLUMNS]
     wanted += [f"{column}.{statistic}" for statistic in CHATTER for column in TORQUE]
-    return Result(
-        row,
-        variant,
-        flown,
-        None,
-        measure(log, wanted),
-        BaseTorque.of(log) if planned.compared else None,
-    )
+    torque = BaseTorque.of(log) if is_shown and row.case == COMPARED_CASE else None
+    return Result(row, variant, parameters, None, measure(log, wanted), torque)
 
 
-def parameters(flight: Flight) -> dict[str, Any]:
-    """Return the settings of plant, controller and mission in a flight."""
+def _parameters(flight: Flight) -> dict[str, Any]:
     navigation = flight.controller_settings.filter_settings
     return {
         "period_s": flight.period,

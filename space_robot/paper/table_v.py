@@ -2,10 +2,6 @@
 
 from __future__ import annotations
 
-COLUMNS = ("attitude", "joints_1_3", "joints_4_6", "base_torque", "torque_1_3", "torque_4_6")
-"""Keys of `space_robot.analysis.analyze` in the order of the table's columns."""
-TRACKING, TORQUE = COLUMNS[:3], COLUMNS[3:]
-
 HEADINGS = {
     "attitude": ("attitude", ""),
     "joints_1_3": ("joints 1-3", "rad"),
@@ -14,7 +10,9 @@ HEADINGS = {
     "torque_1_3": ("torque 1-3", "N m"),
     "torque_4_6": ("torque 4-6", "N m"),
 }
-"""Name and unit of each column."""
+"""Name and unit of each column, by its name in `space_robot.analysis.analyze`."""
+COLUMNS = tuple(HEADINGS)
+TRACKING, TORQUE = COLUMNS[:3], COLUMNS[3:]
 
 PRINTED: dict[tuple[str, str], tuple[float, ...]] = {
     ("ctc", "1"): (2.5642e-4, 0.0107, 0.0227, 0.8772, 0.9896, 0.0454),
@@ -36,8 +34,3 @@ PRINTED: dict[tuple[str, str], tuple[float, ...]] = {
     ("tde_stc", "4-2"): (6.9310e-4, 8.4968e-5, 1.2741e-4, 1.3002, 1.4276, 0.0889),
 }
 """Values by controller and case: mean of the axes' RMS values, which is not (64)."""
-
-
-def printed(controller: str, case: str, column: str) -> float:
-    """Return one number of Table V."""
-    return PRINTED[controller, case][COLUMNS.index(column)]

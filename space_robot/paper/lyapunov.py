@@ -1,6 +1,11 @@
-"""The LMI (51): a Lyapunov function ``V = eta^T M eta`` (47) with decay rate gamma.
+"""The conditions of Appendix B on one axis: circle criterion (73) and LMI (51).
 
-(51) requires M > 0 and gamma > 0 with
+The circle criterion: ``G(j omega)`` (74) must stay within the circle of radius 1 / beta. The text
+under (71) says radius beta; (73) is correct. The second case of (77) is misprinted (its terms have
+different units); the one here follows from (75) and (76).
+
+The LMI has a Lyapunov function ``V = eta^T M eta`` (47) with decay rate gamma. (51) requires M > 0
+and gamma > 0 with
 
     [ A^T M + M A + gamma M + beta^2 C^T C   M B ]
     [ B^T M                                   -1 ]  <=  0.
@@ -27,15 +32,39 @@ from numpy.typing import NDArray
 from scipy.linalg import solve_continuous_are
 from scipy.optimize import brentq
 
-from .circle_criterion import largest_tolerated_beta
-
 Array = NDArray[np.float64]
+ComplexArray = NDArray[np.complex128]
 
 B = np.array([[0.0], [1.0]])
 C = np.array([[1.0, 0.0]])
 
 MARGIN = 1e-3
 """Relative reduction of the largest gamma, so that (51) holds despite rounding."""
+
+
+def transfer_function(k_1: float, k_2: float, omega: Array) -> ComplexArray:
+    """(74): ``G(j omega) = 1 / (2 s^2 + K_1 s + K_2)``, at ``omega`` in rad/s; s3/rad."""
+    s = 1j * omega
+    return np.asarray(1.0 / (2.0 * s**2 + k_1 * s + k_2))
+
+
+def peak_gain(k_1: float, k_2: float) -> float:
+    """(77), corrected: ``max |G(j omega)|``, infinite if G is not asymptotically stable.
+
+    Its square is ``1 / K_2^2`` at omega = 0 if ``K_1^2 >= 4 K_2``, else
+    ``16 / (8 K_2 K_1^2 - K_1^4)`` at ``omega^2 = K_2 / 2 - K_1^2 / 8``.
+    """
+    tolerated = largest_tolerated_beta(k_1, k_2)
+    return 1.0 / tolerated if tolerated > 0.0 else np.inf
+
+
+def largest_tolerated_beta(k_1: float, k_2: float) -> float:
+    """Return the largest beta for (73), ``1 / max |G|``, which is K_2 if ``K_1^2 >= 4 K_2``."""
+    if k_1 <= 0.0 or k_2 <= 0.0:
+        return 0.0
+    if k_1**2 >= 4.0 * k_2:
+        return k_2
+    return k_1 / 4.0 * float(np.sqrt(8.0 * k_2 - k_1**2))
 
 
 @dataclass(frozen=True)
@@ -50,7 +79,7 @@ class Certificate:
     m_eigenvalues: Array
     """(2,) eigenvalues of M, ascending."""
     residual: float
-    """Largest eigenvalue of the block matrix of (51)."""
+    """Largest eigenvalue of the left side of (51)."""
 
     def value(self, eta: Array) -> Array:
         """(47): V of ``eta`` (..., 2)."""
@@ -81,16 +110,11 @@ def paper_m(k_1: float, k_2: float) -> Array:
     return 0.5 * np.array([[k_1**2 + 4.0 * k_2, -k_1], [-k_1, 2.0]])
 
 
-def block_matrix(m: Array, k_1: float, k_2: float, beta: float, gamma: float) -> Array:
-    """Return the left side (3, 3) of (51)."""
-    a = state_matrix(k_1, k_2)
-    corner = a.T @ m + m @ a + gamma * m + beta**2 * C.T @ C
-    return np.block([[corner, m @ B], [B.T @ m, -np.eye(1)]])
-
-
 def residual(m: Array, k_1: float, k_2: float, beta: float, gamma: float) -> float:
     """Return the largest eigenvalue of the left side of (51); at most 0 if the LMI holds."""
-    return float(np.linalg.eigvalsh(block_matrix(m, k_1, k_2, beta, gamma))[-1])
+    a = state_matrix(k_1, k_2)
+    corner = a.T @ m + m @ a + gamma * m + beta**2 * C.T @ C
+    return float(np.linalg.eigvalsh(np.block([[corner, m @ B], [B.T @ m, -np.eye(1)]]))[-1])
 
 
 def shifted_gains(k_1: float, k_2: float, gamma: float) -> tuple[float, float]:
