@@ -22,7 +22,7 @@ from ..analysis.template import template
 from ..console.files import csv_writer
 from ..console.tables import as_markdown
 from ..flight.flown_log import empty_log
-from ..flight.plan import Flight, FlightPlan, resolve
+from ..flight.plan import Flight, Scenario, resolve
 from ..processes.pool import run_all
 from ..processes.software import commit, versions
 from .comparison import Cell, cells, chatter, chatter_table, claims, claims_table, variant_tables
@@ -84,7 +84,7 @@ def reproduce(
         InputError: the folder contains other files, or the base has no attitude actuators.
     """
     check_results_folder(folder)
-    if not Flight(resolve(FlightPlan(actuators=equipment.actuators))).controls_base:
+    if not Flight(resolve(Scenario(actuators=equipment.actuators))).controls_base:
         raise InputError(
             f"actuators {equipment.actuators}: Table V has attitude errors and base torques, so "
             "the base needs attitude actuators"
@@ -103,7 +103,7 @@ def reproduce(
         flown = dict(zip(order, run_all(fly_one, order, jobs, progress), strict=True))
         results = [flown[flight] for flight in planned]
         if torques := {r.row.controller: r.base_torque for r in results if r.base_torque}:
-            log = empty_log(Flight(resolve(FlightPlan(robot=ROBOT, duration=duration))))
+            log = empty_log(Flight(resolve(Scenario(robot=ROBOT, duration=duration))))
             figures.save(drawn.desired_joints(log), MISSION)
             for stem, (_, draw) in COMPARISONS.items():
                 figures.save(draw(torques), stem)

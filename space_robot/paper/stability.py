@@ -38,7 +38,7 @@ from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.errors import InputError
 
 from ..analysis.generalised_motion import neglected_force
-from ..flight.plan import NO_FRICTION, Flight, FlightPlan, resolve
+from ..flight.plan import NO_FRICTION, Flight, Scenario, resolve
 from ..tuning.spectrum import contraction_matrix
 from .lyapunov import Certificate, certify, largest_tolerated_beta, paper_m, peak_gain, residual
 
@@ -183,7 +183,7 @@ class Reaching:
     """(m,) reaching time, s; NaN if the surface was not reached."""
 
 
-def off_mission_plan(flight: Flight, initial_error: float) -> FlightPlan:
+def off_mission_plan(flight: Flight, initial_error: float) -> Scenario:
     """Return the plan of ``flight``, started at rest with ``e = initial_error`` on every axis."""
     start = flight.mission.chunk(0, 1)
     eps = start.base[0, 1:4] - initial_error
@@ -328,7 +328,7 @@ class StabilityStudy:
         return self.flight.robot.axis_names
 
 
-def study(plan: FlightPlan, initial_error: float, fly: Fly) -> StabilityStudy:
+def study(plan: Scenario, initial_error: float, fly: Fly) -> StabilityStudy:
     """Fly the flights of the study and check every condition of the paper.
 
     Args:
