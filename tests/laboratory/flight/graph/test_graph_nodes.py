@@ -94,6 +94,12 @@ def step(ground: Ground, ticks: int) -> str:
     return str(ground.call(Trigger, "/plant_node/step", Trigger.Request()).message)
 
 
+def hears(ground: Ground, node: str, topic: str) -> bool:
+    """Whether a node's subscription is known."""
+    known = ground.node.get_subscriptions_info_by_topic(topic)
+    return node in [info.node_name for info in known]
+
+
 def test_killed_nodes_are_replaced_in_flight(start: Start, ground: Ground, tmp_path: Path) -> None:
     """Lockstep holds the plant while no controller or no mission is there; the next one takes over.
 
@@ -108,6 +114,7 @@ def test_killed_nodes_are_replaced_in_flight(start: Start, ground: Ground, tmp_p
     assert plant.returncode == 0, output
     assert "flew 0.1000 s" in output
     recorder = start("recorder", bag=tmp_path / "bag")
+    ground.until(lambda: hears(ground, "recorder_node", "/command"), "the recorder")
     waits["wait_for"] = wait_for("controller")
     listeners = {"wait_for": wait_for("plant"), "silence_timeout": 0.0}
     plant = start("plant", ticks=1_000, paused=True, **listeners)
