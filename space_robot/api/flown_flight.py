@@ -221,8 +221,8 @@ class FlownFlight:
             InputError: viser is not installed, no log was kept, a plot is unknown, another one is
                 no flight, or the file cannot be written.
         """
+        from ..analysis.plotted import parse_kinds
         from ..view.flights import ViewOptions  # slow to import
-        from ..view.plot_kinds import parse_kinds
 
         flights = (self, *others)
         for other in others:

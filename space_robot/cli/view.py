@@ -2,17 +2,37 @@
 
 from __future__ import annotations
 
+import os
 import webbrowser
 from pathlib import Path
 
 import click
+from click.core import ParameterSource
 
-from ..view.plot_kinds import PLOT_KINDS, parse_kinds
 from .numbers import FiniteRange
 from .options import NAMESPACE, REMAP, TRUST, file_option
 
 SECTION = "Results"
 SUFFIXES = (".html", ".htm")
+NICENESS = 10
+"""Niceness of the live viewer, so that it does not delay the graph."""
+LIVE_ONLY = ("domain", "port")
+ALWAYS = ("live", "opens", "light", "namespace", "plots")
+
+
+class PlotsOption(click.Option):
+    """An option whose help has the names of the table of plotted quantities."""
+
+    def get_help_record(self, ctx: click.Context) -> tuple[str, str] | None:
+        """Return the option and its help."""
+        from ..analysis.plotted import KINDS  # slow
+
+        names = ", ".join(KINDS)
+        self.help = f"Shown first, of {names}; others can be chosen on the page [default: {USUAL}]."
+        return super().get_help_record(ctx)
+
+
+USUAL = "errors, drift, torques, actuators"
 
 
 @click.command()
@@ -44,10 +64,10 @@ SUFFIXES = (".html", ".htm")
 @click.option("--title", default="", help="Of the page [default: the bags' names].")
 @click.option(
     "--plots",
+    cls=PlotsOption,
     default="",
     metavar="KIND,...",
-    help=f"Shown first, of {', '.join(PLOT_KINDS)}; others can be chosen on the page [default: "
-    "errors, drift, torques, actuators].",
+    help=f"Shown first [default: {USUAL}].",
 )
 @click.option("--light", is_flag=True, help="Dark on white, to print.")
 @REMAP
@@ -109,18 +129,18 @@ def view(
     from space_robot_msgs_py.errors import InputError
 
     from ..analysis import excerpt
+    from ..analysis.plotted import parse_kinds
     from ..console.files import check_writable, make_folder, whole_file
     from ..console.progress import counting_progress
     from ..view.flights import ViewOptions, flights_page, remarks_on, shown_robot
     from ..view.stage import check_viser
     from .analyze import bag_names
-    from .view_live import check_options, serve_live
 
-    check_options(context, live, bags)
+    _check_options(context, live, bags)
     kinds = parse_kinds(plots) if plots else ()
     check_viser()
     if live:
-        serve_live(domain, namespace, robot, port, light, opens, kinds)
+        _serve(domain, namespace, port, light, opens, kinds)
         return
     names = bag_names(bags)
     page = out or Path(f"{'_'.join(names)}_view.html")
@@ -143,3 +163,47 @@ def view(
     click.echo(f"wrote {page} ({page.stat().st_size / 1e6:.1f} MB)", err=True)
     if opens and not webbrowser.open(page.absolute().as_uri()):
         click.echo("no browser available: open the page in one yourself", err=True)
+
+
+def _check_options(context: click.Context, live: bool, bags: tuple[Path, ...]) -> None:
+    """Refuse options of recorded flights for a live one, and the other way round."""
+    from space_robot_msgs_py.errors import InputError
+
+    if live == bool(bags):
+        raise InputError("a BAG was expected, or --live without one")
+    for option in context.command.params:
+        name = option.name or ""
+        is_typed = context.get_parameter_source(name) is ParameterSource.COMMANDLINE
+        if is_typed and name not in ("bags", *ALWAYS) and (name in LIVE_ONLY) != live:
+            other = "recorded flights" if live else "--live"
+            raise InputError(f"{option.opts[0]} is for {other} only")
+
+
+def _serve(
+    domain: int | None,
+    namespace: str | None,
+    port: int,
+    light: bool,
+    opens: bool,
+    plots: tuple[str, ...],
+) -> None:
+    from ..flight.graph.orchestrator import require_ros
+
+    require_ros()
+    click.echo("starting the scene ...", err=True)  # where much else runs, that takes a while
+    from ..processes.interruption import Interrupted
+    from ..view.live import serve
+
+    def say(text: str) -> None:
+        click.echo(text, err=True)
+
+    def ready(address: str) -> None:
+        say(f"the scene is at {address}; Ctrl-C ends")
+        if opens:
+            webbrowser.open(address)
+        os.nice(NICENESS)
+
+    try:
+        serve(domain, namespace or "", port, not light, plots, say, ready)
+    except Interrupted:
+        say("ended")

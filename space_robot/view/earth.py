@@ -15,7 +15,7 @@ from space_robot_model.elementary.matrices import unit_rows
 from space_robot_model.orbit.elements import EARTH_RADIUS
 
 from .glb import grid_faces, unlit_glb
-from .orbit_frames import OrbitFrames
+from .orbit import OrbitFrames
 from .scene import set_pose
 
 if TYPE_CHECKING:
@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
+Tints = tuple[tuple[int, int, int], tuple[int, int, int]]
 
 RESOLUTION = 2.0**-20
 """Resolution of the Earth's position relative to its distance: 1e-6 rad."""
@@ -45,9 +46,9 @@ TWILIGHT = (-0.10, 0.25)
 class Shades(NamedTuple):
     """Colours of the Earth, red, green and blue from 0 to 255, by day and by night."""
 
-    ground: tuple[tuple[int, int, int], tuple[int, int, int]]
-    lines: tuple[tuple[int, int, int], tuple[int, int, int]]
-    haze: tuple[tuple[tuple[int, int, int], tuple[int, int, int]], ...]
+    ground: Tints
+    lines: Tints
+    haze: tuple[Tints, ...]
     """Of the layers of `HAZE`."""
 
 

@@ -1,10 +1,16 @@
-"""Page of flights: robots, scene, plots and marks."""
+"""The page of flights: one HTML file with the scene, synchronised plots and marks."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+import math
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from importlib.resources import files
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
 
 from space_robot_model.robot import Robot
 from space_robot_model.robot.find import find_robot, robot_as_path
@@ -14,16 +20,16 @@ from space_robot_msgs_py.bag.law_history import as_data, in_words, laws_of
 from space_robot_msgs_py.errors import InputError
 
 from ..analysis.described import check_joints, robot_of
-from .actuators import actuator_notes
-from .arrows import ArrowKind, arrow_kinds
-from .film import FilmedFlight, film
+from ..analysis.template import template
+from .actuators import ActuatorFrames, actuator_notes, described_actuators
+from .animation import ShownFlight, animate
 from .frames import RATE_HZ, shown_times
-from .marks import shared_marks
-from .meshes import shown_shapes
-from .orbit_frames import is_in_orbit, sun_direction
-from .page import Shown, render
-from .palette import palette
-from .plots import plots_of
+from .orbit import ArrowKind, arrow_kinds, is_in_orbit, sun_direction
+from .plots import Mark, Plot, plots_of, shared_marks
+from .scene import palette
+from .shapes import shown_shapes
+
+Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -39,7 +45,7 @@ class ViewOptions:
     dark: bool = True
     """True for light on dark."""
     plots: tuple[str, ...] = ()
-    """Kinds of the plots that are shown first, see `PLOT_KINDS`; empty: the usual ones."""
+    """Kinds of the plots that are shown first, see `plotted.KINDS`; empty: the usual ones."""
 
 
 def flights_page(
@@ -61,29 +67,35 @@ def flights_page(
     """
     colours = palette(options.dark)
     flights = [
-        FilmedFlight(name, log, robots[name], _law(log), colours[k % len(colours)])
+        ShownFlight(name, log, robots[name], colours[k % len(colours)])
         for k, (name, log) in enumerate(logs.items())
     ]
-    of_one = len({(flight.robot.name, flight.robot.body_names) for flight in flights}) == 1
+    is_same_robot = len({(robot.name, robot.body_names) for robot in robots.values()}) == 1
     times = shown_times(list(logs.values()), options.rate)
-    scene = film(flights, times, options.side_by_side or not of_one, options.dark, advance)
+    side_by_side = options.side_by_side or not is_same_robot
+    scene = animate(flights, times, side_by_side, options.dark, advance)
     plots = plots_of(logs, robots, colours, options.plots)
-    notes = list(
-        dict.fromkeys(note for log in logs.values() for note in actuator_notes(log, times))
-    )
+    notes = [note for log in logs.values() for note in _actuator_notes(log, times)]
     if absent := set(options.plots) - {plot.kind for plot in plots}:
         notes.append(f"Not in the recording: {', '.join(sorted(absent))}.")
     return render(
         options.title or ", ".join(logs),
         scene,
-        [Shown(f.name, f.colour, _told(f), f.log.defects) for f in flights],
+        [PageBag(f.name, f.colour, _description(f), f.log.defects) for f in flights],
         plots,
         shared_marks(logs),
         float(times[0]),
         options.dark,
         _legend(logs, options.dark),
-        notes,
+        list(dict.fromkeys(notes)),
     )
+
+
+def _actuator_notes(log: FlightLog, times: Array) -> list[str]:
+    flown = described_actuators(log)
+    has_any = flown.wheel_count or flown.thruster_count
+    slowdown = ActuatorFrames.of(log, flown, times).slowdown if has_any else 1.0
+    return actuator_notes(flown, slowdown)
 
 
 def shown_robot(log: FlightLog, name: str = "") -> Robot:
@@ -126,11 +138,97 @@ def _legend(logs: Mapping[str, FlightLog], dark: bool) -> list[ArrowKind]:
     return arrow_kinds(has_sun, dark) if in_orbit else []
 
 
-def _law(log: FlightLog) -> str:
-    return in_words(as_data(laws_of(log), log.timebase)) or str(log.flight.get("controller", ""))
+def _description(flight: ShownFlight) -> str:
+    log = flight.log
+    law = in_words(as_data(laws_of(log), log.timebase)) or str(log.flight.get("controller", ""))
+    case = log.flight.get("case")
+    return ", ".join(filter(None, [law, flight.robot.name, f"case {case}" if case else ""]))
 
 
-def _told(flight: FilmedFlight) -> str:
-    case = flight.log.flight.get("case")
-    words = [flight.law, flight.robot.name, f"case {case}" if case else ""]
-    return ", ".join(filter(None, words))
+class PageBag(NamedTuple):
+    """A flight on the page."""
+
+    name: str
+    colour: str
+    what: str
+    warnings: Sequence[str] = ()
+    """Defects of its recording, a sentence each."""
+
+
+def render(
+    title: str,
+    scene: str,
+    bags: Sequence[PageBag],
+    plots: Sequence[Plot],
+    marks: Sequence[Mark],
+    start: float,
+    dark: bool,
+    arrows: Sequence[ArrowKind] = (),
+    notes: Sequence[str] = (),
+) -> str:
+    """Render the self-contained page.
+
+    Args:
+        title: of the page.
+        scene: viser's page of the scene.
+        bags: that are shown.
+        plots: in order, with a common time.
+        marks: on the time axis.
+        start: time of the first frame, s.
+        dark: whether the page is light on dark.
+        arrows: at the bases of robots in orbit.
+        notes: on how things are drawn, a sentence each.
+    """
+    folder = files(__package__).joinpath("templates")
+    data = {
+        "plots": [
+            {
+                "title": plot.title,
+                "unit": plot.unit,
+                "logarithmic": plot.is_logarithmic,
+                "pulses": plot.are_pulses,
+                "shown": plot.is_shown,
+                "limits": list(plot.limits),
+                "series": [
+                    {
+                        "label": s.label,
+                        "colour": s.colour,
+                        "wanted": s.is_wanted,
+                        "values": _digits(s.values, plot.is_logarithmic),
+                    }
+                    for s in plot.series
+                ],
+            }
+            for plot in plots
+        ],
+        "marks": [
+            {
+                "start": m.start,
+                "stop": m.stop if math.isfinite(m.stop) else None,
+                "text": m.text,
+                "kind": m.kind,
+            }
+            for m in marks
+        ],
+        "time": np.round(plots[0].time, 4).tolist() if plots else [],
+        "start": start,
+        "dark": dark,
+    }
+    return template("space_robot.view", "view.html.j2").render(
+        title=title,
+        scene=scene,
+        bags=bags,
+        dark=dark,
+        uplot=folder.joinpath("uPlot.iife.min.js").read_text("utf-8"),
+        uplot_css=folder.joinpath("uPlot.min.css").read_text("utf-8"),
+        css=folder.joinpath("view.css").read_text("utf-8"),
+        arrows=arrows,
+        notes=notes,
+        script=folder.joinpath("view.js").read_text("utf-8"),
+        data=data,
+    )
+
+
+def _digits(values: Array, is_logarithmic: bool) -> list[Any]:
+    known = np.isfinite(values) & ~(is_logarithmic & (values <= 0.0))
+    return [float(f"{x:.4g}") if k else None for x, k in zip(values, known, strict=True)]

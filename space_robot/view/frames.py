@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -17,6 +17,8 @@ from space_robot_msgs_py.errors import InputError
 from ..analysis.errors import controls_base
 
 Array = NDArray[np.float64]
+Move = Callable[[int], None]
+"""Updates a part of a scene to the k-th frame; called for k = 0, 1, ..."""
 
 RATE_HZ = 30.0
 """Default frame rate of a page."""
@@ -84,10 +86,6 @@ class Frames:
             tools,
             _desired(log, robot, rows) if wanted is None else wanted[rows],
         )
-
-    def move_to(self, k: int) -> tuple[Array, Array, list[Transform], int]:
-        """Return the arguments of `RobotScene.move` for the k-th time."""
-        return self.base_position[k], self.base_quaternion[k], self.joints, k
 
 
 def shown_times(logs: Sequence[FlightLog], rate: float) -> Array:

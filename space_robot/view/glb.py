@@ -20,7 +20,10 @@ LINES, TRIANGLES = 1, 4
 """glTF's kinds of primitives."""
 
 
-def unlit_glb(vertices: Array, colours: Array, faces: Indices, lines: Indices) -> bytes:
+NO_LINES = np.empty((0, 2), np.int64)
+
+
+def unlit_glb(vertices: Array, colours: Array, faces: Indices, lines: Indices = NO_LINES) -> bytes:
     """Return the content of a GLB file.
 
     Args:
@@ -91,6 +94,24 @@ def grid_faces(rings: int, parts: int) -> Indices:
     this, following = first + np.arange(parts), first + (np.arange(parts) + 1) % parts
     halves = [(this, this + parts, following + parts), (this, following + parts, following)]
     return np.concatenate([np.stack(half, axis=-1).reshape(-1, 3) for half in halves])
+
+
+def revolved_glb(radii: Array, heights: Array, colours: Array, sides: int) -> bytes:
+    """Return a surface of revolution about z as a GLB file.
+
+    Args:
+        radii: (R,) of the section, counterclockwise in (r, z), m.
+        heights: (R,) of the same, m.
+        colours: (R, 3) or (R, 4) of its points.
+        sides: facets around z.
+    """
+    angles = np.arange(sides) * (2.0 * np.pi / sides)
+    rings = np.empty((len(radii), sides, 3))
+    rings[..., 0] = radii[:, np.newaxis] * np.cos(angles)
+    rings[..., 1] = radii[:, np.newaxis] * np.sin(angles)
+    rings[..., 2] = heights[:, np.newaxis]
+    faces = grid_faces(len(radii), sides)[:, ::-1]
+    return unlit_glb(rings.reshape(-1, 3), np.repeat(colours, sides, axis=0), faces)
 
 
 def _chunk(kind: bytes, content: bytes) -> bytes:

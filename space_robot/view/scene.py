@@ -1,13 +1,16 @@
-"""The robot in a viser scene: shapes attached to moving frames of the bodies."""
+"""A viser scene and a robot in it: shapes attached to moving frames of the bodies."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import TYPE_CHECKING, NamedTuple
+import logging
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from space_robot_model.elementary.matrices import unit_rows
 from space_robot_model.elementary.rotations import quaternion_of_rotation
 from space_robot_model.robot import Robot
 from space_robot_model.robot.parts import Visual
@@ -18,12 +21,10 @@ from space_robot_model.robot.placements import (
     tool_transforms,
 )
 
-from .mesh import Mesh
-from .meshes import shown_shapes
-from .spacecraft import ShapePart, parts_of
+from .shapes import Mesh, parts_of, shown_shapes
 
 if TYPE_CHECKING:
-    from viser import FrameHandle, SceneApi, SceneNodeHandle
+    from viser import FrameHandle, SceneApi, SceneNodeHandle, ViserServer
 
 Array = NDArray[np.float64]
 
@@ -31,6 +32,38 @@ AXES = 0.08
 """Length of a tool's axes relative to that of all links."""
 GREY = (0.7, 0.7, 0.7, 1.0)
 """Colour of shapes without a colour."""
+ON_DARK = ("#56B4E9", "#E98FC0", "#2CC295", "#E69F00", "#F0E442", "#FF7F41")
+ON_WHITE = ("#0072B2", "#CC79A7", "#009E73", "#E69F00", "#8A7F00", "#D55E00")
+"""Colours of Okabe and Ito, adapted to dark and light pages; flights have the first ones."""
+
+
+def palette(dark: bool) -> tuple[str, ...]:
+    """Return the colours of a page that is light on dark, or dark on light."""
+    return ON_DARK if dark else ON_WHITE
+
+
+@contextmanager
+def local_server(port: int = 0) -> Iterator[ViserServer]:
+    """Serve scenes to browsers on this machine only, on 127.0.0.1, without output.
+
+    Args:
+        port: to listen on; the next free one if it is in use. 0: any.
+    """
+    from rich import get_console
+    from viser import ViserServer
+
+    # an unused connection of a browser is not an error
+    logging.getLogger("websockets.server").setLevel(logging.CRITICAL)
+    console = get_console()
+    was_quiet, console.quiet = console.quiet, True
+    try:
+        server = ViserServer(host="127.0.0.1", port=port, verbose=False)
+        try:
+            yield server
+        finally:
+            server.stop()
+    finally:
+        console.quiet = was_quiet
 
 
 class SceneStyle(NamedTuple):
@@ -144,63 +177,49 @@ def add_shape(
     red, green, blue = (round(255 * value) for value in own)
     colour = rgb(look.tint) if look.tint else (red, green, blue)
     opacity = alpha * look.opacity if alpha * look.opacity < 1.0 else None
-    position, turn, more = shape.position, quaternion_of_rotation(shape.rotation), look.growth
+    pose: dict[str, Any] = {
+        "position": shape.position,
+        "wxyz": quaternion_of_rotation(shape.rotation),
+        "opacity": opacity,
+    }
+    more = look.growth
     if not look.tint and not look.growth and (parts := parts_of(shape)):
-        first, *others = parts
-        node = _add_part(scene, path, first, look, position, turn)
-        for part in others:
-            _add_part(scene, f"{path}/{part.name}", part, look)
-        return node
+        pose["opacity"] = look.opacity if look.opacity < 1.0 else None
+        nodes = []
+        for part in parts:
+            name = f"{path}/{part.name}" if nodes else path
+            own_colour = tuple(round(255 * value) for value in part.colour[:3])
+            nodes.append(
+                scene.add_mesh_simple(name, *part.mesh, color=own_colour, flat_shading=True, **pose)
+            )
+            pose = {"opacity": pose["opacity"]}  # the others are on the first one
+        return nodes[0]
     if mesh is not None:
-        vertices = mesh.vertices * shape.size
         flips = np.prod(shape.size) < 0.0  # mirrored: faces must be reversed
-        return scene.add_mesh_simple(
-            path,
-            vertices,
-            mesh.faces[:, ::-1] if flips else mesh.faces,
-            color=colour,
-            opacity=opacity,
-            flat_shading=True,
-            position=position,
-            wxyz=turn,
-        )
+        faces = mesh.faces[:, ::-1] if flips else mesh.faces
+        vertices = mesh.vertices * shape.size
+        return scene.add_mesh_simple(path, vertices, faces, color=colour, flat_shading=True, **pose)
     if shape.shape == "box":
         x, y, z = (edge + 2.0 * more for edge in shape.size)
-        return scene.add_box(path, colour, (x, y, z), opacity=opacity, position=position, wxyz=turn)
+        return scene.add_box(path, colour, (x, y, z), **pose)
     if shape.shape == "cylinder":
         radius, length = shape.size[0] + more, shape.size[1] + 2.0 * more
-        return scene.add_cylinder(
-            path, radius, length, colour, opacity=opacity, position=position, wxyz=turn
-        )
-    return scene.add_icosphere(
-        path, shape.size[0] + more, colour, opacity=opacity, position=position, wxyz=turn
-    )
-
-
-def _add_part(
-    scene: SceneApi,
-    path: str,
-    part: ShapePart,
-    look: SceneStyle,
-    position: Array | tuple[float, float, float] = (0.0, 0.0, 0.0),
-    turn: Array | tuple[float, float, float, float] = (1.0, 0.0, 0.0, 0.0),
-) -> SceneNodeHandle:
-    red, green, blue, _ = (round(255 * value) for value in part.colour)
-    return scene.add_mesh_simple(
-        path,
-        *part.mesh,
-        color=(red, green, blue),
-        opacity=look.opacity if look.opacity < 1.0 else None,
-        flat_shading=True,
-        position=position,
-        wxyz=turn,
-    )
+        return scene.add_cylinder(path, radius, length, colour, **pose)
+    return scene.add_icosphere(path, shape.size[0] + more, colour, **pose)
 
 
 def rgb(colour: str) -> tuple[int, int, int]:
     """Return red, green and blue, from 0 to 255, of a colour such as ``#E69F00``."""
     red, green, blue = bytes.fromhex(colour.removeprefix("#"))
     return red, green, blue
+
+
+def turns_from_z(directions: Array) -> Array:
+    """Return the shortest rotations from z to unit vectors (K, 3), (K, 4) ``[w, x, y, z]``."""
+    x, y, z = directions.T
+    turns = np.column_stack([1.0 + z, -y, x, np.zeros(len(z))])
+    turns[z < -1.0 + 1e-12] = (0.0, 1.0, 0.0, 0.0)
+    return unit_rows(turns)
 
 
 def _part(name: str) -> str:

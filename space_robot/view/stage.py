@@ -1,7 +1,8 @@
-"""Environment of the robots in a scene: stars, inertial axes, lights, initial camera."""
+"""What is around the robots of a scene: stars, inertial axes, lights, and the initial camera."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from importlib.util import find_spec
 from typing import TYPE_CHECKING, Literal, NamedTuple
 
@@ -11,15 +12,14 @@ from scipy.spatial.transform import Rotation
 
 from space_robot_model.elementary.matrices import unit_rows
 from space_robot_model.elementary.rotations import quaternion_of_rotation
+from space_robot_model.orbit.elements import EARTH_RADIUS
 from space_robot_model.robot import Robot
-from space_robot_model.robot.parts import Visual
 from space_robot_model.robot.placements import base_axes, body_frames
 from space_robot_msgs_py.config.installation import install_command
 from space_robot_msgs_py.errors import InputError
 
-from .horizon import Horizon
-from .mesh import Mesh
-from .meshes import shown_shapes
+from .extent import BaseSurface
+from .orbit import OrbitFrames
 
 if TYPE_CHECKING:
     from viser import DirectionalLightHandle, SceneApi, ViserServer
@@ -46,7 +46,12 @@ BEHIND = 2.0
 IN_SHADOW = 0.12
 """Intensity of the Sun's light in the Earth's shadow, relative to that outside: none would hide
 the robot."""
-CORNERS = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], dtype=float)
+LIMB = 0.6
+"""Distance of the Earth's limb below the middle of the first picture, relative to half of it."""
+STEEPEST = np.radians(30.0)
+"""Largest elevation of the initial camera in orbit."""
+MOST_HIDDEN = 0.25
+"""Share of the arms that the base may hide from the initial camera."""
 
 
 def check_viser() -> None:
@@ -57,6 +62,36 @@ def check_viser() -> None:
     """
     if find_spec("viser") is None:
         raise InputError(f"view needs viser: {install_command('view')}")
+
+
+class Horizon(NamedTuple):
+    """Directions in a scene in orbit, at its first frame."""
+
+    axes: Array
+    """(3, 3) columns along the track, the orbit's normal and up, inertial axes."""
+    dip: float
+    """Angle of the Earth's limb below the horizontal, rad."""
+    sun: Array | None
+    """(3,) unit vector to the Sun; None: unknown."""
+
+    @classmethod
+    def of(cls, orbit: OrbitFrames) -> Horizon:
+        """Return the one of an orbit's first frame."""
+        up, velocity = orbit.up[0], orbit.velocity[0]
+        normal = np.cross(up, velocity)
+        normal /= np.linalg.norm(normal)
+        axes = np.column_stack([np.cross(normal, up), normal, up])
+        distance = float(np.linalg.norm(orbit.position[0]))
+        return cls(axes, float(np.arccos(EARTH_RADIUS / distance)), orbit.sun)
+
+    def camera_direction(self, direction: Array) -> Array:
+        """Return the direction (3,) from the robots to the initial camera, on `axes`.
+
+        It has x and y of the ``direction`` without the Earth; the limb is in its lower half.
+        """
+        elevation = np.clip(self.dip - LIMB * 0.5 * FIELD_OF_VIEW, 0.0, STEEPEST)
+        aside = direction[:2] / np.linalg.norm(direction[:2])
+        return np.array([*np.cos(elevation) * aside, np.sin(elevation)])
 
 
 class Stage(NamedTuple):
@@ -129,7 +164,7 @@ def camera_direction(side: Array, horizon: Horizon | None) -> Array:
     """
     direction = DIRECTION * side
     if horizon:
-        return np.asarray(horizon.axes @ horizon.camera_direction(direction, FIELD_OF_VIEW))
+        return np.asarray(horizon.axes @ horizon.camera_direction(direction))
     return np.asarray(direction / np.linalg.norm(direction))
 
 
@@ -197,50 +232,48 @@ def _distance(points: Array, back: Array) -> float:
     return 1.12 * float(np.max(points @ back + aside / slope))
 
 
-def extent(robot: Robot, position: Array, quaternion: Array, joint_positions: Array) -> Array:
-    """Return the corners of a robot's shapes in some poses, (K, 3) m, inertial frame.
+def clearest_side(
+    flights: Sequence[tuple[Robot, Array, Array]], horizon: Horizon | None = None
+) -> Array:
+    """Return the first of `SIDES` where the base hides at most `MOST_HIDDEN` of the arms.
+
+    Or, if there is none, the one where it hides least.
 
     Args:
-        robot: with its visuals.
-        position: (T, 3) of the base, m.
+        flights: robots with the attitudes (T, 4) of their bases and the positions (T, N) of all
+            their joints, rad or m.
+        horizon: of a scene in orbit.
+    """
+    shares = []
+    for side in SIDES:
+        direction = camera_direction(side, horizon)
+        shares.append(float(np.mean([_hidden_share(*flight, direction) for flight in flights])))
+        if shares[-1] <= MOST_HIDDEN:
+            break
+    return np.asarray(SIDES[int(np.argmin(shares))])
+
+
+def _hidden_share(
+    robot: Robot, quaternion: Array, joint_positions: Array, direction: Array
+) -> float:
+    """Return the share of actuated joints and tools that are behind the base.
+
+    Args:
+        robot: with the base.
         quaternion: (T, 4) of the base.
         joint_positions: (T, N) of all joints, rad or m.
+        direction: (3,) unit vector to a camera far away, inertial axes.
     """
-    axes = base_axes(quaternion.T)
-    frames = {f.body: f for f in body_frames(robot, axes, joint_positions.T)}
-    corners = []
-    drawn = shown_shapes(robot)
-    for shape in drawn.shapes:
-        frame = frames[shape.body]
-        for corner in shape_corners(shape, drawn.meshes.get(shape.mesh)):
-            place = frame.on_outer_axes(shape.position + shape.rotation @ corner)
-            corners.append(position + (frame.origin + place).T)
-    return np.concatenate(corners)
-
-
-def body_reach(robot: Robot, body: int) -> float:
-    """Return the largest distance, m, of a body's shapes from its frame's origin; 0 without."""
-    drawn = shown_shapes(robot)
-    corners = [
-        shape.position + shape_corners(shape, drawn.meshes.get(shape.mesh)) @ shape.rotation.T
-        for shape in drawn.shapes
-        if shape.body == body
+    surface, still = BaseSurface(robot), np.eye(3)[:, :, np.newaxis]
+    frames = {f.body: f for f in body_frames(robot, still, joint_positions.T)}
+    points = [frames[joint + 1].origin for joint in range(robot.n)]
+    points += [
+        frames[tool.body].origin + frames[tool.body].on_outer_axes(tool.position)
+        for tool in robot.tools
     ]
-    return float(np.linalg.norm(np.concatenate(corners), axis=1).max()) if corners else 0.0
-
-
-def shape_corners(shape: Visual, mesh: Mesh | None) -> Array:
-    """Return the corners of a shape's bounding box, (8, 3) m, in the shape's axes."""
-    size = np.array(shape.size)
-    middle = np.zeros(3)
-    if mesh is not None:
-        low, high = mesh.vertices.min(axis=0) * size, mesh.vertices.max(axis=0) * size
-        middle, half = 0.5 * (low + high), 0.5 * (high - low)
-    elif shape.shape == "box":
-        half = 0.5 * size
-    elif shape.shape == "cylinder":
-        half = np.array([size[0], size[0], 0.5 * size[1]])
-    else:
-        half = np.full(3, size[0])
-    corners: Array = middle + CORNERS * half
-    return corners
+    hidden = [
+        surface.distance(point[:, k], axes @ direction) > 1e-3
+        for k, axes in enumerate(np.moveaxis(base_axes(quaternion.T), 2, 0))
+        for point in (np.broadcast_to(p, (3, len(quaternion))) for p in points)
+    ]
+    return float(np.mean(hidden))

@@ -52,6 +52,15 @@ function drawMarks(u) {
   ctx.restore();
 }
 
+function drawLimits(u, limits) {
+  const { ctx, bbox, scales } = u;
+  ctx.fillStyle = colourOf("faint");
+  for (const limit of limits.filter((value) => value >= scales.y.min && value <= scales.y.max)) {
+    const y = Math.round(u.valToPos(limit, "y", true));
+    for (let x = 0; x < bbox.width; x += 6) ctx.fillRect(bbox.left + x, y, 3, 1);
+  }
+}
+
 function drawTime(u) {
   const place = stretch(u, time, time);
   if (!place) return;
@@ -105,9 +114,11 @@ function draw(plot, box) {
       axes: [{ ...axis, size: 24, values: (_, v) => v.map((x) => `${x}`) }, axisOf(plot)],
       series: [
         { label: "s", value: (_, v) => number(v) },
-        ...plot.series.map((s, k) => ({ label: s.label, stroke: s.colour, width: 1, value: share(plot, k) })),
+        ...plot.series.map((s, k) => ({
+          label: s.label, stroke: s.colour, width: 1, value: share(plot, k), ...(s.wanted && { class: "wanted", dash: [4, 4] }),
+        })),
       ],
-      hooks: { drawAxes: [drawMarks], draw: [drawTime], setScale: [zoomed] },
+      hooks: { drawAxes: [drawMarks], draw: [(u) => drawLimits(u, plot.limits), drawTime], setScale: [zoomed] },
     },
     [times, ...plot.series.map((_, k) => curve(plot, k))],
     box,

@@ -16,26 +16,36 @@ from numpy.typing import NDArray
 from scene_pages import Scene, moving_log, page_of
 from scipy.integrate import cumulative_trapezoid
 
-from space_robot.view import mesh, meshes
-from space_robot.view.flights import ViewOptions
-from space_robot.view.local_server import local_server
-from space_robot.view.mesh import read_mesh, simplify
-from space_robot.view.meshes import read_meshes, shown_shapes
-from space_robot.view.plumes import SHORTEST, PlumeFrames
-from space_robot.view.scene import RobotScene
-from space_robot.view.solids import cone, foil, frame, panel
-from space_robot.view.spacecraft import BACK_COLOUR, THICKNESS, panels_of_plates, parts_of
-from space_robot.view.wheels import (
+from space_robot.view import shapes
+from space_robot.view.actuators import (
     FASTEST,
     LARGEST_TURN,
     SATURATED,
+    SHORTEST,
     STEP,
-    WheelFrames,
+    ActuatorFrames,
     slowdown_of,
     wheel_places,
 )
+from space_robot.view.extent import BaseSurface
+from space_robot.view.flights import ViewOptions
+from space_robot.view.scene import RobotScene, local_server
+from space_robot.view.shapes import (
+    BACK_COLOUR,
+    THICKNESS,
+    cone,
+    foil,
+    frame,
+    panel,
+    panels_of_plates,
+    parts_of,
+    read_mesh,
+    read_meshes,
+    shown_shapes,
+    simplify,
+)
 from space_robot_control.allocation.settings import assumed_actuators
-from space_robot_model.hardware.base_actuators import WheelSettings
+from space_robot_model.hardware.base_actuators import BaseActuatorSettings, WheelSettings
 from space_robot_model.robot import Robot
 from space_robot_model.robot.parts import Plate, Visual
 from space_robot_model.robot.shapes import BASE_COLOUR, PANEL_COLOUR
@@ -110,13 +120,13 @@ def test_plates_beside_the_base_are_panels_of_their_area(paper_robot: Robot) -> 
         Plate(1.0, up, np.array([0.0, 0.0, 0.63])),  # a face of the base
         Plate(2.0, np.array([0.6, 0.0, 0.8]), -aside, specular=0.7),
     )
-    shapes = shown_shapes(replace(paper_robot, plates=plates)).shapes
-    first, second = shapes[len(shown_shapes(paper_robot).shapes) :]
+    drawn = shown_shapes(replace(paper_robot, plates=plates)).shapes
+    first, second = drawn[len(shown_shapes(paper_robot).shapes) :]
     assert first.size == pytest.approx((2.0, 2.0, THICKNESS))
     assert second.size == pytest.approx((np.sqrt(2.0), np.sqrt(2.0), THICKNESS))
     np.testing.assert_allclose(second.rotation[:, 2], [0.6, 0.0, 0.8])
     assert (first.colour, second.colour) == (PANEL_COLOUR, BACK_COLOUR)
-    assert list(panels_of_plates(paper_robot, shapes)) == []
+    assert list(panels_of_plates(paper_robot, drawn)) == []
 
 
 def test_a_large_mesh_keeps_its_form_with_fewer_faces(
@@ -125,7 +135,7 @@ def test_a_large_mesh_keeps_its_form_with_fewer_faces(
     whole = read_mesh(str(ball))
     assert len(whole.faces) == 20_480
     assert simplify(whole, 20_480) is whole
-    monkeypatch.setattr(meshes, "MOST_FACES", 2_000)
+    monkeypatch.setattr(shapes, "MOST_FACES", 2_000)
     found = shown_shapes(replace(paper_robot, visuals=(visual(ball),)))
     small = found.meshes[str(ball)]
     assert 500 < len(small.faces) <= 2_000
@@ -159,20 +169,19 @@ def test_files_that_are_too_large_or_none_are_told_and_the_others_share_the_face
 ) -> None:
     lacking, broken = tmp_path / "lacking.stl", tmp_path / "broken.glb"
     broken.write_bytes(b"glTF" + bytes(30))
-    *unreadable, read = read_meshes((str(lacking), str(broken), str(ball)), 3 * 2_000)
-    assert unreadable[0].reason == "no such file"
-    assert all(result.reason and result.mesh is None for result in unreadable)
-    assert read.mesh is not None
-    assert read.whole == 20_480
-    assert 500 < len(read.mesh.faces) <= 2_000  # its share
-    monkeypatch.setattr(mesh, "MOST_READ", 20_480)
+    read, remarks = read_meshes((str(lacking), str(broken), str(ball)), 3 * 2_000)
+    assert [*read] == [str(ball)]
+    assert 500 < len(read[str(ball)].faces) <= 2_000  # its share
+    assert remarks[0] == f"mesh {lacking}: cannot be drawn (no such file)"
+    assert remarks[1].startswith(f"mesh {broken}: cannot be drawn (")
+    monkeypatch.setattr(shapes, "MOST_READ", 20_480)
     assert len(read_mesh(str(ball)).faces) == 20_480
     for name, limit, why in (
         ("MOST_READ", 20_479, r"^20480 faces, at most 20479 are allowed$"),
         ("MOST_BYTES", 1000, "at most 0.001 MB are allowed"),
     ):
-        monkeypatch.setattr(mesh, name, limit)
-        with pytest.raises(mesh.UnreadableMeshError, match=why):
+        monkeypatch.setattr(shapes, name, limit)
+        with pytest.raises(shapes.UnreadableMeshError, match=why):
             read_mesh(str(ball))
 
 
@@ -219,7 +228,9 @@ def test_a_wheel_at_a_limit_between_two_frames_is_marked() -> None:
     log.wheel_torques[13, 0] = -2.0  # the motor's largest
     log.wheel_velocities[25:, 1] = 100.0  # 10 N m s
     log.wheel_velocities[5] = np.nan
-    frames = WheelFrames.of(log, WHEELS, np.array([0.0, 0.1, 0.2, 0.3]))
+    frames = ActuatorFrames.of(
+        log, BaseActuatorSettings(wheels=WHEELS), np.array([0.0, 0.1, 0.2, 0.3])
+    )
     assert frames.is_saturated[:, 0].tolist() == [False, False, True, False]
     assert frames.is_saturated[:, 1].tolist() == [False, False, False, True]
     assert np.isfinite(frames.angles).all()
@@ -229,14 +240,15 @@ def test_wheels_are_at_the_corners_and_those_of_one_axis_behind_one_another(
     paper_robot: Robot,
 ) -> None:
     axes = assumed_actuators("wheels", paper_robot).wheels.unit_axes
-    places = wheel_places(paper_robot, axes)
+    surface, com = BaseSurface(paper_robot), paper_robot.com[0]
+    places = wheel_places(surface, com, axes)
     edge = np.sqrt(6.0 * 200.0 / 750.0) / 2.0
     away = np.linalg.norm(places, axis=1)
     np.testing.assert_allclose(places / away[:, np.newaxis], axes, atol=1e-12)
     assert (away > np.sqrt(3.0) * edge).all()
     assert (away < np.sqrt(3.0) * edge + 0.1).all()
     along_z = np.array([[0, 0, 1.0]] * 2 + [[0, 0, -1.0]])
-    first, second, opposite = wheel_places(paper_robot, along_z)
+    first, second, opposite = wheel_places(surface, com, along_z)
     assert edge < first[2] < second[2]
     assert opposite[2] < -edge
 
@@ -286,7 +298,7 @@ def test_between_two_frames_the_mean_thrust_counts() -> None:
     log.thrusts[:] = np.random.default_rng(1).uniform(size=(101, 3))
     log.thrusts[7] = np.nan
     rows = [0, 10, 35, 100]
-    thrusts = PlumeFrames.of(log, 1e-3 * np.array(rows)).thrusts
+    thrusts = ActuatorFrames.of(log, BaseActuatorSettings(), 1e-3 * np.array(rows)).thrusts
     known = np.nan_to_num(log.thrusts)
     np.testing.assert_array_equal(thrusts[0], known[0])
     for k, (start, stop) in enumerate(pairwise(rows)):

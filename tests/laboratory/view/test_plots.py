@@ -15,10 +15,10 @@ from numpy.typing import NDArray
 from scene_pages import moving_log
 from scipy.spatial.transform import Rotation
 
-from space_robot.view.page import Shown, render
+from space_robot.analysis.analysed_log import AnalysedLog
+from space_robot.analysis.plotted import PlottedQuantity, quantities_of
+from space_robot.view.flights import PageBag, render
 from space_robot.view.plots import STRETCHES, Plot, Series, extremes, plots_of
-from space_robot.view.plotted_quantity import PlottedQuantity
-from space_robot.view.quantities import quantities_of
 from space_robot_control.allocation.settings import assumed_actuators
 from space_robot_model.hardware.base_actuators import BaseActuatorSettings
 from space_robot_model.robot import Robot
@@ -66,8 +66,14 @@ def flight(robot: Robot, actuators: str) -> FlightLog:
     return log
 
 
+def plotted_of(log: FlightLog, robot: Robot) -> list[PlottedQuantity]:
+    analysed = AnalysedLog(log)
+    analysed.robot = robot
+    return [quantity for _, quantity in quantities_of(analysed)]
+
+
 def shown_of(log: FlightLog, robot: Robot) -> dict[str, PlottedQuantity]:
-    return {quantity.title: quantity for quantity in quantities_of(log, robot)}
+    return {quantity.title: quantity for quantity in plotted_of(log, robot)}
 
 
 def test_drift_is_counted_from_the_first_known_row(paper_robot: Robot) -> None:
@@ -106,7 +112,7 @@ def test_passive_joints_are_counted_from_their_rest() -> None:
     springs = tuple(s._replace(rest=r) for s, r in zip(robot.springs, rest, strict=True))
     log = flight(robot, "")
     log.flight = {"prismatic_joints": [robot.passive_names[1]]}
-    quantities = quantities_of(log, replace(robot, springs=springs))
+    quantities = plotted_of(log, replace(robot, springs=springs))
     turning, sliding = [q for q in quantities if q.title == "deflection"]
     away = log.passive_positions - rest
     assert (turning.unit, sliding.unit, sliding.labels) == ("rad", "m", [robot.passive_names[1]])
@@ -135,7 +141,7 @@ def test_motors_are_ahead_of_their_joints_by_the_gears_deflection(
     log.flight = {"prismatic_joints": [names[2]]}
     if has_truth:
         log.record_measured()
-    quantities = quantities_of(log, replace(paper_robot, gears=tuple(gears)))
+    quantities = plotted_of(log, replace(paper_robot, gears=tuple(gears)))
     away = log.motor_positions - log.joint_positions[:, [0, 2, 5]]
     shown = [q for q in quantities if q.title == "gear deflection"]
     for quantity, (unit, columns) in zip(shown, expected, strict=True):
@@ -176,7 +182,7 @@ def test_the_page_has_whatever_names_and_values_of_four_digits(
     time = np.arange(len(values)) / 3.0
     series = [Series(name, "#112233", np.array(values)) for name in names]
     plot = Plot(names[0], "", time, series, is_logarithmic)
-    shown = [Shown(names[0], "#112233", names[0])]
+    shown = [PageBag(names[0], "#112233", names[0])]
     page = render(names[0], "", shown, [plot], [], 0.0, True)
     (written,) = re.findall(r'<script id="data"[^>]*>(.*?)</script>', page, re.DOTALL)
     assert "<" not in written

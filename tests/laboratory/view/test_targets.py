@@ -15,7 +15,7 @@ from scipy.spatial.transform import Rotation
 
 from space_robot.view import targets as drawing
 from space_robot.view.flights import ViewOptions
-from space_robot.view.free_body import before_capture, held_poses
+from space_robot.view.targets import before_capture, held_poses
 from space_robot_model.robot import Robot
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_sim.environment.events import Capture, Release

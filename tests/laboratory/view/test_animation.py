@@ -21,12 +21,12 @@ from strategies import random_tree
 
 from space_robot import Scenario
 from space_robot.analysis import excerpt
-from space_robot.view.film import FilmedFlight, film
+from space_robot.analysis.analysed_log import AnalysedLog
+from space_robot.analysis.plotted import quantities_of
+from space_robot.view.animation import DESIRED, PIECES, ShownFlight, animate, trails
 from space_robot.view.flights import ViewOptions, shown_robot
 from space_robot.view.frames import MOST_FRAMES, Frames, shown_times
-from space_robot.view.marks import Mark, marks_of, shared_marks
-from space_robot.view.quantities import quantities_of
-from space_robot.view.trails import DESIRED, PIECES, trails
+from space_robot.view.plots import Mark, marks_of, shared_marks
 from space_robot_model.robot import Robot
 from space_robot_model.robot.placements import frame_names, tool_pose
 from space_robot_msgs_py.bag.flight_log import FlightLog
@@ -109,8 +109,8 @@ def test_the_poses_of_a_tree_with_all_kinds_of_joints() -> None:
     log.base_position[:] = rng.normal(size=(40, 3))
     log.passive_positions[:] = rng.uniform(-0.2, 0.2, log.passive_positions.shape)
     times = shown_times([log], 100.0)
-    flight = FilmedFlight("tree", log, robot, "", "#112233")
-    page = film([flight], times, False, True, lambda total: lambda: None)
+    flight = ShownFlight("tree", log, robot, "#112233")
+    page = animate([flight], times, False, True, lambda total: lambda: None)
     assert_shown(Scene(page), log, robot, times)
 
 
@@ -182,11 +182,11 @@ def test_the_tool_ends_at_its_goal_and_its_distance_from_the_path_is_plotted(flo
         np.testing.assert_allclose(goal.position, place, atol=1e-5)
         np.testing.assert_allclose(goal.rotation, rotation[0], atol=1e-4)
     assert np.linalg.norm(goals[-1].position - goals[0].position) > 0.07
-    (tool,) = [q for q in quantities_of(log, robot) if q.title == "tool error"]
+    (tool,) = [q for _, q in quantities_of(AnalysedLog(log), ["tool"]) if q.title == "tool error"]
     assert tool.values.max() == flight.metrics["tool.max"]
     plain = flown("paper")
     assert not any("/goal_" in name for name in Scene(page_of(robot, a=plain)).names())
-    assert "tool error" not in [q.title for q in quantities_of(plain, shown_robot(plain))]
+    assert "tool error" not in [q.title for _, q in quantities_of(AnalysedLog(plain), ["tool"])]
 
 
 @settings(max_examples=50)

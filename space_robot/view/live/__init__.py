@@ -1,1 +1,0 @@
-"""Live scene of a running flight."""
