@@ -28,7 +28,7 @@ from space_robot_msgs_py.samples import LawInForce, in_order
 from space_robot_msgs_py.topics import Topic
 from space_robot_msgs_py.wire.telemetry import LawCodec
 
-from .commands import CommandList, ReplayedCommands
+from .comparison import CommandList, ReplayedCommands
 
 COMPARED = (
     *topics.STATES,
@@ -58,7 +58,7 @@ class ReferenceMessage(NamedTuple):
 
 
 class Recording:
-    """Messages of a bag received and sent by the controller. Independent of ROS."""
+    """Messages of a bag that its controller received and sent."""
 
     def __init__(
         self, path: Path, remap: Mapping[str, str] | None = None, namespace: str | None = None
@@ -79,11 +79,11 @@ class Recording:
             self._selection = Selection(self._bag, remap or {}, namespace)
             flight = read_description(self._bag.custom_data())
             counts: Counter[Topic] = Counter()
-            states = _Steps()
+            stamps_ns = [np.empty(0, np.int64)]
             for topic, batch in self._selection.batches():
                 counts[topic] += len(batch)
                 if topic is topics.JOINT_STATES:
-                    states.take(batch.stamps)
+                    stamps_ns.append(batch.stamps)
             for topic in REQUIRED:
                 if not counts[topic]:
                     raise missing(topic, self._bag, self._selection)
@@ -114,7 +114,8 @@ class Recording:
         sent."""
         recorded = self._selection.recorded() or {}
         is_short = any(recorded.get(topic.full_name, 0) > counts[topic] for topic in COMPARED)
-        has_gaps = not (excused or states.are_even(self.timebase.period_ns, bool(flight)))
+        steps = np.diff(np.concatenate(stamps_ns), prepend=-self.timebase.period_ns)
+        has_gaps = not excused and np.any(steps[0 if flight else 1 :] != self.timebase.period_ns)
         self.is_whole = not (is_short or has_gaps or self._bag.incomplete) and self.is_finished
         """True if the bag holds all that the controller was sent and answered, as far as anybody
         knows."""
@@ -209,25 +210,3 @@ class Recording:
         except OSError as error:
             why = error.strerror or error
             raise InputError(f"{self.path}: cannot be read ({why})") from None
-
-
-class _Steps:
-    """The steps between the stamps of a topic, which a gap makes uneven."""
-
-    def __init__(self) -> None:
-        self._first = self._last = -1
-        self._found: set[int] = set()
-
-    def take(self, stamps_ns: NDArray[np.int64]) -> None:
-        """Take the next stamps."""
-        if not len(stamps_ns):
-            return
-        if self._first < 0:
-            self._first = self._last = int(stamps_ns[0])
-            stamps_ns = stamps_ns[1:]
-        self._found |= set(np.unique(np.diff(stamps_ns, prepend=self._last)).tolist())
-        self._last = int(stamps_ns[-1]) if len(stamps_ns) else self._last
-
-    def are_even(self, period_ns: int, begins_at_zero: bool) -> bool:
-        """Return True if every tick has its stamp, from the first (or tick 0) on."""
-        return self._found <= {period_ns} and (self._first == 0 or not begins_at_zero)

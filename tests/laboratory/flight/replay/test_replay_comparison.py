@@ -11,8 +11,7 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from space_robot.flight.replay.commands import CommandList, Form, ReplayedCommands
-from space_robot.flight.replay.comparison import Comparison
+from space_robot.flight.replay.comparison import CommandList, Comparison, Form, ReplayedCommands
 from space_robot_msgs_py.samples import Command, Timebase
 from space_robot_msgs_py.wire.codecs import CommandCodec
 from space_robot_msgs_py.wire.definitions import decode, jazzy
