@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import struct
 from array import array
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -40,70 +40,64 @@ class ReplayedCommands(NamedTuple):
     """(N,)"""
     torque: Array
     """(N, m) N m, in the order of the robot's axes; NaN where a message has others."""
-    form: NDArray[np.intp]
-    """(N,) index into ``forms``."""
-    forms: list[Form]
-    unreadable: int
+    forms: Mapping[int, Form]
+    """By tick, of those whose form is not that of this project."""
+    unreadable: int = 0
     """Messages that were no command at all, or not of a whole tick."""
 
     def within(self, start: int, stop: float) -> ReplayedCommands:
         """Those of the ticks from ``start`` to before ``stop``."""
         inside = (self.ticks >= start) & (self.ticks < stop)
-        return self._replace(
-            ticks=self.ticks[inside], torque=self.torque[inside], form=self.form[inside]
-        )
+        return self._replace(ticks=self.ticks[inside], torque=self.torque[inside])
 
 
 class CommandList:
-    """Serialized /command messages, kept as arrays of about 90 bytes each."""
+    """Serialized /command messages, kept as arrays of about 80 bytes each."""
 
     def __init__(self, axis_names: tuple[str, ...], timebase: Timebase) -> None:
         self._names, self._timebase = axis_names, timebase
         self._usual = CompiledCodec(describe(topics.COMMAND, axis_names, timebase))
         self._torque = np.zeros(len(axis_names))
-        usual = Form(topics.BASE_FRAME, str(list(axis_names)))
-        self._forms: dict[Form, int] = {usual: 0}
-        self._ticks, self._torques, self._form = array("q"), array("d"), array("I")
+        self._ticks, self._torques = array("q"), array("d")
+        self._forms: dict[int, Form] = {}
         self._unreadable = 0
 
-    def add(self, data: bytes) -> int | None:
-        """Add a message; return the tick it answers, or None if it is not readable."""
-        form = 0
+    def add(self, data: bytes) -> None:
+        """Add a message."""
         try:
+            form = None
             if (stamp_ns := self._usual.read(data, self._torque)) == FOREIGN:
-                stamp_ns, form = self._read_foreign(data)
+                stamp_ns, form = header_stamp_ns(data), self._read_foreign(data)
             tick = self._timebase.tick(stamp_ns)
         except MessageError:
             self._unreadable += 1
-            return None
+            return
+        if form:
+            self._forms[len(self._ticks)] = form
         self._ticks.append(tick)
         self._torques.frombytes(self._torque.tobytes())
-        self._form.append(form)
-        return tick
 
-    def _read_foreign(self, data: bytes) -> tuple[int, int]:
-        """Stamp, ns, and form of a message in another layout; its torques into ``_torque``."""
+    def _read_foreign(self, data: bytes) -> Form:
+        """Read the torques of a message in another layout; return its form."""
         message = decode(data, topics.COMMAND.type)
         efforts, names = message.effort, list(message.name)
-        form = Form(
-            message.header.frame_id, str(names), _text(message.position), _text(message.velocity)
-        )
+        texts = _text(message.position), _text(message.velocity)
+        form = Form(message.header.frame_id, str(names), *texts)
         try:
             order = name_order(names, self._names, topics.COMMAND.full_name)
             self._torque[:] = efforts[order]
         except (MessageError, IndexError):
             self._torque[:] = np.nan
-            form = form._replace(effort=_text(efforts))
-        return header_stamp_ns(data), self._forms.setdefault(form, len(self._forms))
+            return form._replace(effort=_text(efforts))
+        return form
 
     def commands(self) -> ReplayedCommands:
         """Return the commands; of several for one tick the first."""
         ticks, first = np.unique(np.frombuffer(self._ticks, np.int64), return_index=True)
         torques = np.frombuffer(self._torques, np.float64).reshape(-1, len(self._names))
-        form = np.frombuffer(self._form, np.uint32).astype(np.intp)
-        return ReplayedCommands(
-            ticks, torques[first], form[first], list(self._forms), self._unreadable
-        )
+        kept = set(first.tolist()) & self._forms.keys()
+        forms = {self._ticks[i]: self._forms[i] for i in kept}
+        return ReplayedCommands(ticks, torques[first], forms, self._unreadable)
 
 
 def number(value: float) -> float | str:
@@ -180,8 +174,7 @@ class Comparison:
             recorded.ticks[is_played], replayed.ticks, assume_unique=True, return_indices=True
         )
         """(K,) Ticks with both commands."""
-        self._at, self._again = np.flatnonzero(is_played)[at], again
-        self.recorded: Array = recorded.torque[self._at]
+        self.recorded: Array = recorded.torque[is_played][at]
         """(K, m) in `units`."""
         self.replayed: Array = replayed.torque[again]
         """(K, m) in `units`."""
@@ -190,19 +183,13 @@ class Comparison:
         self.unrecorded: Ticks = np.setdiff1d(replayed.ticks, recorded.ticks)
         """Ticks with a command now that have none in the bag."""
         self._same_torque = _bits(self.recorded) == _bits(self.replayed)
-        self.equal: NDArray[np.bool_] = self._same_torque.all(axis=1) & self._same_form()
+        other = [
+            tick
+            for tick in {*recorded.forms, *replayed.forms}
+            if recorded.forms.get(tick) != replayed.forms.get(tick)
+        ]
+        self.equal: NDArray[np.bool_] = self._same_torque.all(axis=1) & ~np.isin(self.ticks, other)
         """(K,) whether every field is the same, to the last bit."""
-
-    def _same_form(self) -> NDArray[np.bool_]:
-        numbers: dict[Form, int] = {}
-        recorded, replayed = (
-            np.array([numbers.setdefault(form, len(numbers)) for form in forms], np.intp)
-            for forms in (self._recorded.forms, self._replayed.forms)
-        )
-        same: NDArray[np.bool_] = (
-            recorded[self._recorded.form[self._at]] == replayed[self._replayed.form[self._again]]
-        )
-        return same
 
     @property
     def is_identical(self) -> bool:
@@ -235,13 +222,12 @@ class Comparison:
         if self.equal.all():
             return None
         k = int(np.argmin(self.equal))
-        forms = (
-            self._recorded.forms[self._recorded.form[self._at[k]]],
-            self._replayed.forms[self._replayed.form[self._again[k]]],
-        )
+        tick = int(self.ticks[k])
+        usual = Form(topics.BASE_FRAME, str(list(self.axis_names)))
+        one, other = (c.forms.get(tick, usual) for c in (self._recorded, self._replayed))
         differences = [
             Difference(field, a, b)
-            for field, a, b in zip(forms[0]._fields, *forms, strict=True)
+            for field, a, b in zip(usual._fields, one, other, strict=True)
             if a != b
         ]
         differences += [
@@ -252,7 +238,7 @@ class Comparison:
             )
             for i in np.flatnonzero(~self._same_torque[k])
         ]
-        return int(self.ticks[k]), differences
+        return tick, differences
 
     def report(self, period: float) -> dict[str, Any]:
         """The numbers, for JSON and the table; ``period``: of a tick, s."""

@@ -48,31 +48,13 @@ class StateMessages(NamedTuple):
     """One of each part that was asked for, in that order."""
 
 
-class ReferenceMessage(NamedTuple):
-    """A message of the reference."""
-
-    tick: int
-    """The tick of its first point."""
-    topic: Topic
-    data: bytes
-
-
 class Recording:
     """Messages of a bag that its controller received and sent."""
 
     def __init__(
         self, path: Path, remap: Mapping[str, str] | None = None, namespace: str | None = None
     ) -> None:
-        """Open the bag in ``path``.
-
-        Args:
-            path: the bag.
-            remap: our topic by the bag's.
-            namespace: of the robot; None: of the only one in the bag.
-
-        Raises:
-            InputError: no bag is there, it cannot be read, or has no states or references.
-        """
+        """Open a bag; ``remap`` and ``namespace``: see `read_flight`."""
         self.path = path
         with self._readable():
             self._bag = open_bag(path)
@@ -145,8 +127,8 @@ class Recording:
     ) -> Iterator[StateMessages]:
         """States of the ticks from ``start`` to before ``stop``, as they were sent.
 
-        One of which any of the ``parts`` is missing, or whose stamp is none, is passed over; of a
-        damaged bag also one without its reference, which the controller would wait for.
+        One without any of the ``parts``, or with a wrong stamp, is passed over; of a damaged bag
+        also one without its reference, for which the controller would have held an earlier one.
         """
         queues: dict[Topic, deque[tuple[int, bytes]]] = {topic: deque() for topic in parts}
         for topic, tick, data in self._of_ticks(*parts):
@@ -173,20 +155,17 @@ class Recording:
         whole = self._whole
         return whole is None or (tick < len(whole) and bool(whole[tick]))
 
-    def references(self, topic: Topic, start: int = 0) -> Iterator[ReferenceMessage]:
-        """Messages of half the reference, from the last one that begins by tick ``start``."""
-        begun: ReferenceMessage | None = None
+    def references(self, topic: Topic, start: int = 0) -> Iterator[tuple[int, bytes]]:
+        """First tick and data of half the reference, from the last message begun by ``start``."""
+        begun: list[tuple[int, bytes]] = []
         for _, tick, data in self._of_ticks(topic):
-            reference = ReferenceMessage(tick, topic, data)
-            if reference.tick <= start:
-                begun = reference
+            if tick <= start:
+                begun = [(tick, data)]
                 continue
-            if begun:
-                yield begun
-                begun = None
-            yield reference
-        if begun:
-            yield begun
+            yield from begun
+            begun = []
+            yield tick, data
+        yield from begun
 
     def _of_ticks(self, *wanted: Topic) -> Iterator[tuple[Topic, int, bytes]]:
         """Yield the messages of some topics whose stamps are whole ticks, with these."""

@@ -34,7 +34,7 @@ from ...processes.scratch_folder import ScratchFolder
 from ..compilation import compile_kernels
 from .choice import ControllerChoice
 from .comparison import CommandList, Comparison, ReplayedCommands
-from .recording import Recording, ReferenceMessage, StateMessages
+from .recording import Recording, StateMessages
 
 SHOW_TICKS = 500
 AHEAD = 64
@@ -182,10 +182,8 @@ class RecordedLaws:
     ) -> None:
         """Begin before the first state.
 
-        Args:
-            laws: by rising tick.
-            put: puts a law in force.
-            start_again: gives the controller a fresh memory, as a restart did in flight.
+        ``laws``: by rising tick; ``put``: puts one in force; ``start_again``: gives the controller
+        a fresh memory, as a restart did in flight.
         """
         self._coming = deque(laws)
         self._put, self._start_again = put, start_again
@@ -214,24 +212,24 @@ class ReferenceStream:
 
     def __init__(
         self,
-        messages: Iterator[ReferenceMessage],
+        messages: Iterator[tuple[int, bytes]],
         decode: Callable[[bytes], tuple[int, NDArray[np.float64]]],
         add: Callable[[int, NDArray[np.float64]], None],
     ) -> None:
         self._messages, self._decode, self._add = messages, decode, add
-        self._ahead: deque[ReferenceMessage] = deque()
+        self._ahead: deque[tuple[int, bytes]] = deque()
         self._look_ahead()
 
     def feed(self, tick: int) -> None:
         """Decode what was sent for the ticks up to ``tick``."""
         while self._due <= tick:
             with suppress(MessageError):  # the flown controller could not use it either
-                self._add(*self._decode(self._ahead.popleft().data))
+                self._add(*self._decode(self._ahead.popleft()[1]))
             self._look_ahead()
 
     def _look_ahead(self) -> None:
         self._ahead.extend(islice(self._messages, AHEAD - len(self._ahead)))
-        self._due = min((message.tick for message in self._ahead), default=math.inf)
+        self._due = min((tick for tick, _ in self._ahead), default=math.inf)
 
 
 class ReplayedController:

@@ -10,7 +10,7 @@ from space_robot_msgs_py.ros.locks import living_nodes, nodes_in
 
 from ...flight.graph.domain import domain_asked_for
 from ...flight.graph.node_names import PLANT
-from ...flight.graph.temporary_node import TemporaryNode
+from ...flight.graph.node_services import TemporaryNode
 
 MOST_NAMES = 5
 """Maximum number of nodes listed in a message."""

@@ -75,7 +75,7 @@ def test_states_and_references_come_as_recorded(bag: Path, tmp_path: Path) -> No
     assert ticks_of(halves) == [tick for tick in range(400) if tick not in (10, 20)]
     for topic in (topics.REFERENCE_JOINTS, topics.REFERENCE_BASE):
         for start, ticks in ((0, [0, 100, 200, 300]), (250, [200, 300]), (10_000, [300])):
-            assert [r.tick for r in recording.references(topic, start)] == ticks
+            assert [tick for tick, _ in recording.references(topic, start)] == ticks
 
 
 def test_what_the_recorder_missed_is_known(bag: Path, tmp_path: Path) -> None:
