@@ -1,7 +1,7 @@
 """Replay: a bag as the regression test of a controller.
 
-A bag contains the controller's inputs and its commands. `replay` starts the controller's node,
-sends it the recorded bytes again, and compares every command to the last bit. Record once with
+A bag contains the controller's inputs and its commands. `replay` gives a controller the recorded
+messages again, and compares every command to the last bit. Record once with
 software that you trust; after a change of code, assert `has_passed` in a test. Here a different
 gain represents the change: the second replay reports the first tick that differs.
 
@@ -37,6 +37,6 @@ def main(bag: Path) -> None:
 
 
 if __name__ == "__main__":
-    arguments = argparse.ArgumentParser(description="Replay a bag to a live controller.")
+    arguments = argparse.ArgumentParser(description="Replay a bag.")
     arguments.add_argument("--bag", type=Path, default=Path("flights/trusted"))
     main(arguments.parse_args().bag)

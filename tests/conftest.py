@@ -91,11 +91,7 @@ forget_workspace(os.environ)
 
 OF_ROS = {"domain", "free_domain", "fly", "start", "ground"}
 """Fixtures of tests that start ROS processes, or are a node of their own."""
-WITH_ROS = (
-    "control/controller/test_law_changes.py",
-    "laboratory/flight/graph/",
-    "laboratory/flight/replay/",
-)
+WITH_ROS = ("control/controller/test_law_changes.py", "laboratory/flight/graph/")
 SLOW = (
     "control/flight_code/",
     "laboratory/campaign/",

@@ -13,7 +13,7 @@ import pytest
 import yaml
 
 from space_robot.cli.main import cli
-from space_robot.flight.graph.listeners import LISTENERS
+from space_robot.flight.graph.node_names import LISTENERS
 from space_robot_msgs_py import topics
 
 ROOT = Path(__file__).resolve().parents[1]

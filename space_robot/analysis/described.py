@@ -70,12 +70,11 @@ NO_LIMITS = TorqueLimits(np.inf, np.inf)
 def start_step_of(log: FlightLog) -> dict[str, Any] | None:
     """Return the `StartStep` that the flight began with; None: none is described."""
     step = log.flight.get("start_step")
-    zero = StartStep(0.0, "", 0.0, "", "", "", 0.0, 0.0)._asdict()
+    zero = StartStep()._asdict()
     if not isinstance(step, dict):
         return None
-    if set(step) != set(zero):
-        return None
-    return step if all(type(step[key]) is type(value) for key, value in zero.items()) else None
+    known = {key: step.get(key) for key in zero}
+    return known if all(type(known[key]) is type(value) for key, value in zero.items()) else None
 
 
 def robot_of(log: FlightLog) -> Robot:

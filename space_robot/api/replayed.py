@@ -1,4 +1,4 @@
-"""Replay of a recorded flight to a live controller, as ``space-robot replay``, from Python."""
+"""Replay of a recorded flight, as ``space-robot replay``, from Python."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ from typing import Any
 from space_robot_msgs_py.config.arguments import as_path
 from space_robot_msgs_py.config.validation import one_of
 
-from ..flight.replay.outcome import Replay, ReplayOptions
+from ..flight.replay.run import Replay, ReplayOptions
 from ..flight.replay.run import replay as run
 
 
 def replay(bag: str | Path, **options: Any) -> Replay:
-    """Replay a bag to a new controller node, and compare its commands bit for bit.
+    """Answer the states of a bag by a new controller, and compare its commands bit for bit.
 
     ``has_passed`` of the result is the verdict, ``report()`` is the output of ``replay --json``.
 
@@ -24,8 +24,8 @@ def replay(bag: str | Path, **options: Any) -> Replay:
             controller, ``start_s``, ``end_s``, ...
 
     Raises:
-        InputError: bag or options cannot be used; nothing was started.
-        FlightError: the controller did not start.
+        InputError: bag or options cannot be used.
+        FlightError: the controller failed at the first state.
     """
     allowed = [field.name for field in fields(ReplayOptions) if field.name != "bag"]
     for name in options:

@@ -10,10 +10,9 @@ from space_robot_msgs_py.config.validation import short
 from space_robot_msgs_py.errors import InputError
 
 from ..console.progress import check_progress, rated_progress
-from ..flight.batch.batch import FlightBatch
+from ..flight.batch.batch import FlightBatch, batches
 from ..flight.batch.benches import Benches
 from ..flight.batch.compilation import compile_lanes
-from ..flight.batch.sharing import batches
 from ..flight.compilation import compile_kernels
 from ..flight.plan import Flight
 from ..scenario.scenario import Scenario

@@ -21,12 +21,6 @@ SECTION = "Results"
 @click.option("--gains", default="", help="Its gains [default: those flown].")
 @flight_option("set")
 @click.option(
-    "--rate",
-    type=FiniteRange(0.0, 1e3, min_open=True),
-    metavar="R",
-    help="By the wall clock, R times real time [default: lockstep].",
-)
-@click.option(
     "--start",
     type=FiniteRange(0.0),
     default=0.0,
@@ -44,11 +38,6 @@ SECTION = "Results"
 @REMAP
 @NAMESPACE
 @TRUST
-@click.option(
-    "--domain",
-    type=click.IntRange(0, 232),
-    help="ROS domain [default: ROS_DOMAIN_ID, or a free one].",
-)
 @flight_option("json")
 def replay(
     bag: Path,
@@ -60,12 +49,12 @@ def replay(
     as_json: bool,
     **options: Any,
 ) -> None:
-    """Play a recorded flight to a live controller and compare the commands.
+    """Answer the states of a recorded flight anew and compare the commands.
 
-    Starts a controller node with the recorded law and gains, sends it the recorded states and
-    references through the middleware, byte by byte, in lockstep, and compares every command to
-    the last bit. Exit code 0: all are equal and none is missing; 1: a command differs or is
-    missing, and the first difference is shown; 2: invalid input.
+    A controller with the recorded law and gains gets the recorded states and references, in this
+    process and as fast as it answers; every command is compared to the last bit. Exit code 0: all
+    are equal and none is missing; 1: a command differs or is missing, and the first difference is
+    shown; 2: invalid input.
 
     With another --controller or other --gains, equality is not expected: the command shows
     what they would have commanded on the same history (open loop), with exit code 0.
@@ -77,7 +66,7 @@ def replay(
       space-robot replay flights/one
       space-robot replay flights/one --set controller.tde_stc.k_1=[40.0]
       space-robot replay flights/one --controller ctc --plot ctc_instead.png
-      space-robot replay flights/one --rate 1 --start 5 --end 10 --json
+      space-robot replay flights/one --start 5 --end 10 --json
     """
     import math
 
@@ -85,7 +74,7 @@ def replay(
 
     from ..console.files import check_writable
     from ..console.terminal import echo_json, terminal
-    from ..flight.replay.outcome import ReplayOptions
+    from ..flight.replay.run import ReplayOptions
     from ..flight.replay.run import replay as run
 
     if other := sorted(set(parameters) - {"controller"}):

@@ -14,13 +14,13 @@ from ..console.terminal import say
 from ..console.terminal_tables import print_table
 
 COUNTS = {
-    "played": "states sent",
+    "played": "states replayed",
     "compared": "commands compared",
     "equal": "equal to the last bit",
     "unanswered": "recorded, not answered now",
     "unrecorded": "answered now, not recorded",
     "without_state": "recorded without their state",
-    "skipped": "not answered in flight, not sent",
+    "skipped": "not answered in flight, left out",
 }
 ALWAYS = ("played", "compared", "equal")
 MOST_STRETCHES = 10
@@ -48,7 +48,6 @@ def print_replay(report: dict[str, Any], console: Console) -> None:
 def title(report: dict[str, Any]) -> str:
     """Return a title: the bag replayed and the law that answered."""
     now = report["replayed"]
-    pace = "in lockstep" if report["lockstep"] else f"at {report['rate']:g} times real time"
     law, swaps = now["controller"], ""
     if now["as_in_flight"]:
         law = in_words(report["recorded"]["laws"])
@@ -56,7 +55,7 @@ def title(report: dict[str, Any]) -> str:
         swaps = f", swaps {' '.join(now['swaps'])}"
     changed = "".join(f", {name}={value}" for name, value in now["set"].items())
     law = f"{law}, gains {now['gains']}{swaps}{changed}"
-    return f"replay of {report['bag']}: {law}, {pace}"
+    return f"replay of {report['bag']}: {law}"
 
 
 def counts(report: dict[str, Any]) -> list[tuple[str, str]]:

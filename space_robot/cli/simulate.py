@@ -31,13 +31,14 @@ def simulate(as_json: bool, bag: Path | None, **options: Any) -> None:
     from ..console.progress import flight_progress
     from ..flight.bag_path import check_bag_path
     from ..flight.compilation import compile_kernels
+    from ..flight.flight_messages import bag_remark
     from .report_display import show_next_steps, show_report
 
     flight = plan_flight(**options)
     flight.check_in_process()
     if bag:
         check_bag_path(bag)
-    for remark in remarks_on(flight):
+    for remark in filter(None, (*remarks_on(flight), bag_remark(flight) if bag else "")):
         click.echo(remark, err=True)
     _ = flight.supervisor  # compiled, or refused, before anything is begun
     compile_kernels(bool(flight.plant.names.actuators))  # it has a progress line of its own

@@ -15,7 +15,7 @@ from .checked_item import CheckedItem
 OLDEST, NEWEST = (3, 10), (3, 13)
 """Versions of Python that setup.py admits."""
 USES = {
-    "ros": "fly, goto, sim and replay",
+    "ros": "fly, goto and sim",
     "campaign": "the tables of campaign",
     "view": "view",
     "parquet": "analyze --parquet",

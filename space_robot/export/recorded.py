@@ -23,7 +23,7 @@ from space_robot_control.flight_code.folder import Exported
 from space_robot_msgs_py.errors import FlightError
 from space_robot_msgs_py.samples import RobotState
 
-from ..flight.message_loop import MessageLoop
+from ..flight.flight_messages import MessageLoop
 from ..flight.plan import Flight, Scenario, resolve
 from .software import laws_of
 

@@ -27,8 +27,7 @@ from space_robot_sim.plant.plant import Plant, PlantSnapshot
 from space_robot_sim.plant.settings import PlantSettings
 
 from ..scenario.comparison import differences
-from .bench_history import BenchHistory
-from .bench_log import BenchLog, law_at
+from .bench_log import BenchHistory, BenchLog, law_at
 from .ending import Ending
 from .plan import Flight
 

@@ -1,4 +1,4 @@
-"""The messages of a flight in this process, in a bag as the nodes would send them."""
+"""The messages of a flight in this process: in a bag as nodes would send them, and as a loop."""
 
 from __future__ import annotations
 
@@ -9,11 +9,17 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from space_robot_control.controller.law_choice import LawChoice
+from space_robot_control.controller.reference_buffer import ReferenceBuffer
+from space_robot_control.controller.supervisor import StateResponder, Supervisor
+from space_robot_control.controller.tick import NEW
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.bag.recorder import BagRecorder
+from space_robot_msgs_py.errors import MessageError
 from space_robot_msgs_py.samples import Command, RobotState
 from space_robot_msgs_py.wire.codecs import CommandCodec, StateCodec
+from space_robot_msgs_py.wire.stamp_guard import AGREEING
 from space_robot_msgs_py.wire.telemetry import (
     ClockCodec,
     LawCodec,
@@ -22,18 +28,29 @@ from space_robot_msgs_py.wire.telemetry import (
     TelemetryCodec,
     TruthWriter,
 )
+from space_robot_sim.plant.messages import NO_TICK, CommandGuard, PlantMessages, SentState
 
+from .flown_log import empty_log
 from .plan import Flight
 
 Array = NDArray[np.float64]
+Record = Callable[[topics.Topic, bytes], object]
+LARGE_BAG = 500e6
+"""Bytes of a bag that a user is told before it is written."""
+SMALLEST_TICK = 200
+"""Bytes of a tick below any flight's: shorter flights are not measured."""
+SAMPLE_TICKS, RECORD_BYTES = 1000, 31
+"""Ticks whose messages are counted, and bytes of a message's header in MCAP."""
+COMPRESSED = {"none": 1.0, "lz4": 0.48, "zstd": 0.4}
+"""Share of its bytes that a bag has, as measured with sensors."""
 
 
 class Messages:
     """Writes a flight's messages into a bag, as the nodes would send them."""
 
-    def __init__(self, flight: Flight, recorder: BagRecorder) -> None:
+    def __init__(self, flight: Flight, record: Record) -> None:
         names, timebase = flight.plant.names, flight.timebase
-        self.record, self._flight = recorder.record, flight
+        self.record, self._flight = record, flight
         self._states = StateCodec(names, timebase)
         self._truth = TruthWriter(names, timebase, flight.plant.truth_topics)
         self._commands = CommandCodec(names.commanded, timebase)
@@ -108,6 +125,26 @@ class Messages:
                 record(topics.SIGNALS, self._signals.encode(tick, e, s, n_hat))
 
 
+def bag_remark(flight: Flight) -> str:
+    """Return what a large bag of a flight will need, in a line; empty: it is a small one."""
+    if flight.ticks * SMALLEST_TICK < LARGE_BAG or (size := bag_size(flight)) < LARGE_BAG:
+        return ""
+    return f"the bag of {flight.ticks * flight.period:g} s will need about {size / 1e9:.1f} GB"
+
+
+def bag_size(flight: Flight) -> float:
+    """Return about how many bytes the bag of a flight will have, from its first messages."""
+    sizes: list[int] = []
+    messages = Messages(flight, lambda topic, data: sizes.append(len(data) + RECORD_BYTES))
+    log = empty_log(flight, 0, SAMPLE_TICKS, np.zeros)
+    for states in (log, log.as_measured()):
+        states.quaternion[:, 0] = 1.0
+    messages.stretch(log, 0, SAMPLE_TICKS, SAMPLE_TICKS)
+    messages.end()
+    share = COMPRESSED[flight.scenario.recorder.compression]
+    return share * sum(sizes) / SAMPLE_TICKS * flight.ticks
+
+
 @contextmanager
 def recording(flight: Flight, bag: Path | None) -> Iterator[Messages | None]:
     """Open a bag for the flight's messages, and close it; None: nothing is written."""
@@ -118,7 +155,7 @@ def recording(flight: Flight, bag: Path | None) -> Iterator[Messages | None]:
     recorder = BagRecorder(
         bag, flight.description, flight.timebase, settings.compression, settings.split_size
     )
-    messages = Messages(flight, recorder)
+    messages = Messages(flight, recorder.record)
     try:
         yield messages
     finally:
@@ -141,3 +178,101 @@ def record(flight: Flight, log: FlightLog, bag: Path) -> None:
     with recording(flight, bag) as messages:
         assert messages
         messages.stretch(log, 0, log.ticks, answered)
+
+
+class MessageLoop:
+    """Closed loop of plant, mission and controller by messages; hands each to ``record``.
+
+    So a flight whose messages fail is that of a graph in lockstep, by the same classes. Where the
+    nodes' timing would matter, the graph's flight need not repeat: here the controller takes every
+    state that reaches it, none is passed over.
+    """
+
+    def __init__(
+        self,
+        flight: Flight,
+        record: Record,
+        update_true_state: Callable[[RobotState], None],
+        supervisor: Supervisor | None = None,
+    ) -> None:
+        """Begin at the flight's first tick.
+
+        Args:
+            flight: to be flown.
+            record: called with every message.
+            update_true_state: called with each true state that is not the measured one.
+            supervisor: of the flight's controller, to answer (None: `Flight.supervisor`).
+        """
+        robot, settings = flight.robot, flight.plant_settings
+        names = flight.plant.names
+        self._flight, self._plant, self._record = flight, flight.plant, record
+        self._update_true_state = update_true_state
+        self._guard = CommandGuard(len(names.commanded), settings.hold_ticks)
+        self._states = StateCodec(names, flight.timebase)
+        self._commands = CommandCodec(names.commanded, flight.timebase)
+        self._exchange = PlantMessages(settings, names, flight.period, self._states, self._guard)
+        self._references = ReferenceBuffer(robot.n)
+        self._answering = StateResponder(
+            supervisor or flight.supervisor,
+            LawChoice(flight.law, flight.swaps),
+            self._references,
+            flight.controller_settings,
+        )
+        self._state = RobotState.allocate(robot.n)
+        self._streamed = 0
+        """First tick that the mission has not sent yet."""
+
+    def fly_tick(self) -> None:
+        """Run mission and controller for the plant's tick, and step the plant.
+
+        Raises:
+            DivergedError: see `Plant.step`.
+        """
+        plant, tick = self._plant, self._plant.tick
+        self._stream(tick)
+        for sent in self._exchange.send(plant.state):
+            for message in zip(self._states.topics, sent.messages, strict=True):
+                self._record(*message)
+            self._deliver(sent, tick)
+        if plant.truth_topics:
+            self._update_true_state(plant.truth)
+        self._exchange.end(tick)
+        plant.step(self._guard.act(tick))
+
+    def _stream(self, tick: int) -> None:
+        """Send the reference to the controller as far ahead as the mission does."""
+        settings, mission = self._flight.mission_settings, self._flight.mission
+        while self._streamed < tick + settings.lead_ticks:
+            chunk = mission.chunk(self._streamed, settings.chunk_ticks)
+            self._references.add(chunk)
+            self._streamed = chunk.stop
+
+    def _deliver(self, sent: SentState, tick: int) -> None:
+        """Let the controller have a state; one whose answer is awaited comes until it is there."""
+        for _ in range(1 if sent.answered_by == NO_TICK else AGREEING):
+            if self._answer(sent, tick) == sent.answered_by:
+                return
+
+    def _answer(self, sent: SentState, tick: int) -> int:
+        """Let the controller answer a state, once; the tick that is answered, `NO_TICK` if none is.
+
+        An answer that is asked for again is left out: the next one overtakes it, or is lost
+        with it.
+        """
+        state, references = self._state, self._references
+        try:
+            parts = zip(self._states.topics, sent.messages, strict=True)
+            stamp, *_ = [self._states.decode(topic, data, state) for topic, data in parts]
+        except MessageError:
+            return NO_TICK
+        if self._answering.judge_stamp(stamp) != NEW:
+            return NO_TICK
+        reference = references.at(stamp) if references.covers(stamp) else references.hold(stamp)
+        if reference is None:
+            return NO_TICK
+        for topic, message in self._answering.messages(stamp, state, reference):
+            self._record(topic, message)
+            if topic is topics.COMMAND:
+                self._commands.decode(message, self._guard.offered)
+                self._exchange.take(tick)
+        return stamp

@@ -44,6 +44,18 @@ def flight_log(flight: Flight, ticks: int | None = None) -> FlightLog:
     return log
 
 
+def new_array(count: int, what: str) -> Array:
+    """Return an array of ``count`` numbers, in a file if it is large.
+
+    Raises:
+        InputError: there is no room for the file; says so of ``what``.
+    """
+    if 8 * count < MAPPED_FROM:
+        return np.empty(count)
+    check_room(8 * count, what)
+    return mapped((count,))
+
+
 def mapped(shape: tuple[int, ...]) -> Array:
     """Return an array in a file without a name, which the system writes out as it needs."""
     if not math.prod(shape):
@@ -62,7 +74,7 @@ def check_room(size: int, what: str) -> None:
     free = shutil.disk_usage(folder).free
     if size > free:
         raise InputError(
-            f"{what}: the log of the whole flight needs {size / 1e9:.1f} GB in {folder}, "
+            f"{what}: the whole log needs {size / 1e9:.1f} GB in {folder}, "
             f"{free / 1e9:.1f} GB are free: fly a shorter one, or set TMPDIR"
         )
 
@@ -71,16 +83,16 @@ def empty_log(
     flight: Flight,
     start: int = 0,
     stop: int | None = None,
-    new: Callable[[tuple[int, ...]], Array] = of_nan,
+    allocate: Callable[[tuple[int, ...]], Array] = of_nan,
     reference: ReferenceChunk | None = None,
     is_brief: bool = False,
 ) -> FlightLog:
     """Return the log of the ticks ``start`` to ``stop`` (None: the last) before the flight.
 
-    The reference alone is known; it may have been computed. ``new`` makes the columns that the
+    The reference alone is known; it may have been computed. ``allocate`` makes the columns that the
     flight fills. ``is_brief``: with what metrics need only, see `Flight.brief`.
     """
-    log = columns_of(flight, (flight.ticks if stop is None else stop) - start, new, is_brief)
+    log = columns_of(flight, (flight.ticks if stop is None else stop) - start, allocate, is_brief)
     log.first_tick, log.scenario = start, flight.scenario
     log.flight = flight.brief if is_brief else flight.description
     log.lost = {topic.full_name: 0 for topic in topics.ALL}
@@ -92,17 +104,17 @@ def empty_log(
 def columns_of(
     flight: Flight,
     ticks: int,
-    new: Callable[[tuple[int, ...]], Array] = of_nan,
+    allocate: Callable[[tuple[int, ...]], Array] = of_nan,
     is_brief: bool = False,
 ) -> FlightLog:
     """Return the columns of a log, see `empty_log`; if ``is_brief``, of true states only."""
-    log = FlightLog.allocate(ticks, flight.plant.names, flight.timebase, new)
+    log = FlightLog.allocate(ticks, flight.plant.names, flight.timebase, allocate)
     if is_brief:
         return log
-    log.commanded_torque = new(log.applied_torque.shape)
-    log.telemetry = new((ticks, 4, log.axes))
+    log.commanded_torque = allocate(log.applied_torque.shape)
+    log.telemetry = allocate((ticks, 4, log.axes))
     if not flight.plant.measures_truth:
-        log.record_measured(new, flight.plant.names)
+        log.record_measured(allocate, flight.plant.names)
     return log
 
 

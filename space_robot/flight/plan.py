@@ -8,6 +8,7 @@ from functools import cached_property
 from typing import Any
 
 from space_robot_control.controller.controller import Controller
+from space_robot_control.controller.law_choice import NoLaw
 from space_robot_control.controller.supervisor import Supervisor
 from space_robot_control.flight_code.supervisors import supervisor_of
 from space_robot_control.laws import ControlLaw
@@ -105,19 +106,10 @@ class Flight:
 
     @cached_property
     def start_step(self) -> dict[str, Any] | None:
-        """Demand on the law by a start away from the mission's; None: small.
-
-        Returned as a `space_robot.flight.start_step.StartStep`.
-        """
-        step = start_step(
-            self.robot,
-            self.plant_settings,
-            self.mission,
-            self.law,
-            self.build_controller,
-            self.period,
-            self.ticks,
-        )
+        """`StartStep` of a start away from the mission's; None: small, or no law flies."""
+        if self.law.name == NoLaw.name:
+            return None
+        step = start_step(self.robot, self.plant_settings, self.mission)
         return step and step._asdict()
 
     @property

@@ -12,9 +12,8 @@ from space_robot_msgs_py.errors import FlightError
 
 from ..processes.scratch_folder import ScratchFolder
 from .closed_loop import close_loop, measured_ticks
-from .flight_messages import Messages, recording
+from .flight_messages import MessageLoop, Messages, recording
 from .flown_log import ended_early, flight_log, note_assumed_errors
-from .message_loop import MessageLoop
 from .plan import Flight
 
 STRETCH_TICKS, STRETCH_OF_MESSAGES = 10_000, 1_000

@@ -21,16 +21,8 @@ def commit() -> str | None:
     try:
         done = subprocess.run(
             # no tag matches, so it prints the hash
-            [
-                "git",
-                "-C",
-                str(root),
-                "describe",
-                "--always",
-                "--abbrev=40",
-                "--exclude=*",
-                "--dirty",
-            ],
+            ["git", "describe", "--always", "--abbrev=40", "--exclude=*", "--dirty"],
+            cwd=root,
             capture_output=True,
             text=True,
             timeout=10,

@@ -45,7 +45,7 @@ SOONER = 20.0
 LASTS_S = {"docs/manual/analysis.md": 16.0, "docs/manual/view.md": 15.2}
 """Flights of pages that look at a later time."""
 OF_GRAPHS = re.compile(
-    r"fly .*(--(composed|domain|realtime|restart-controller|scenario)|list|\w:[A-Z])|replay"
+    r"fly .*(--(composed|domain|realtime|restart-controller|scenario)|list|\w:[A-Z])"
 )
 """Commands that need a graph. All other options of `fly` are those of `simulate`, which flies the
 same bits (tests/laboratory/flight/graph holds it to that) and is asked in its place."""

@@ -35,8 +35,7 @@ from matrix.scenarios import (
 )
 from space_robot import FlownFlight
 from space_robot.analysis.words import of_statistic
-from space_robot.flight.batch.batch import FlightBatch
-from space_robot.flight.batch.sharing import batches
+from space_robot.flight.batch.batch import FlightBatch, batches
 from space_robot.flight.plan import Flight
 from space_robot_msgs_py.bag.reader import read_flight
 from space_robot_msgs_py.compiled.lanes import WIDTH
@@ -254,9 +253,8 @@ def test_four_processes_fly_it(plan: Planned, flown: Get, tmp_path: Path) -> Non
     fly_graph(plan, tmp_path, flown(plan))
 
 
-@pytest.mark.ros
 @cells("replay")
-def test_a_live_controller_gives_the_recorded_commands(plan: Planned, flown: Get) -> None:
+def test_a_controller_gives_the_recorded_commands_again(plan: Planned, flown: Get) -> None:
     flight = flown(plan)
     ran = space_robot_here("replay", str(flight.bag), "--trust", "--json")
     assert ran.returncode == 0, ran.stdout + ran.stderr

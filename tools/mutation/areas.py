@@ -63,7 +63,7 @@ FURTHER = (
     GRAPHS,
 )
 """Flights by all ways, pages made from the code, commands with their output, nodes."""
-WITH_ROS = ("sim", "control", "laboratory", "ros", "graph", "replay", "guidance", "view")
+WITH_ROS = ("sim", "control", "laboratory", "ros", "graph", "guidance", "view")
 QUICK, NO_ROS = "not ros and not slow", "not ros"
 
 

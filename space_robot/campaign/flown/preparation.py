@@ -11,8 +11,8 @@ from space_robot_msgs_py.config.text import printable
 from space_robot_msgs_py.errors import FlightError, InputError
 
 from ...analysis.own_metric import check_names, function_of, of_mapping
+from ...flight.batch.batch import batch_obstacle
 from ...flight.batch.compilation import compile_lanes
-from ...flight.batch.sharing import reason_to_fly_alone
 from ...flight.compilation import compile_kernels
 from ...flight.plan import Flight
 from ...flight.simulate import simulate
@@ -96,7 +96,7 @@ class Preparation:
     @property
     def notes(self) -> list[str]:
         """A line for each law whose flights cannot be flown eight at a time."""
-        reasons = {law: reason_to_fly_alone(flight) for law, flight in self.flights.items()}
+        reasons = {law: batch_obstacle(flight) for law, flight in self.flights.items()}
         return [f"{law}: flown one by one: {why}" for law, why in reasons.items() if why]
 
     def try_metrics(self, workers: int, timeout_s: float | None) -> None:
@@ -147,7 +147,7 @@ class Preparation:
         has_hardware = any(flight.plant.names.actuators for flight in self.flights.values())
         is_varied = any(name.endswith(ACTUATORS) for name in self.flyer.draws.names)
         compile_kernels(has_hardware or is_varied)
-        if is_in_lanes and not all(map(reason_to_fly_alone, self.flights.values())):
+        if is_in_lanes and not all(map(batch_obstacle, self.flights.values())):
             compile_lanes()
 
     def _check_metrics(self, flight: Flight) -> None:

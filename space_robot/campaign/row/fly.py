@@ -7,24 +7,18 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 
 from space_robot_msgs_py.bag.flight_log import FlightLog
-from space_robot_msgs_py.compiled.lanes import WIDTH
 from space_robot_msgs_py.config.text import one_line_of
 from space_robot_msgs_py.errors import FlightError, InputError, SpaceRobotError
 
 from ...analysis.own_metric import MetricError, of_mapping
-from ...flight.batch.batch import FlightBatch
-from ...flight.batch.sharing import batches
+from ...flight.batch.batch import FlightBatch, batches
 from ...flight.ending import FAILED, Ending
-from ...flight.flown_log import row_bytes
 from ...flight.plan import Flight
 from ...flight.simulate import simulate
 from ..draws import Draws
 from ..study import Study
 from .measure import measure_row, needs_truth_only
 from .row import REFUSED, Row, Task, Value
-
-LARGEST_LOGS = 2**30
-"""Bytes of the logs of flights that are flown together for own metrics; longer ones fly alone."""
 
 
 @dataclass(frozen=True)
@@ -87,7 +81,7 @@ class RowFlyer:
                 rows.append(_unflown(task, self.draws.values(task.run), error))
         for group in batches(enumerate(flights)):
             numbers = [number for number, _ in group]
-            if len(group) == 1 or not self._fits(flights[numbers[0]]):
+            if len(group) == 1:
                 rows += [self(flown[k]) for k in numbers]
                 continue
             try:
@@ -136,10 +130,6 @@ class RowFlyer:
                 row, **measure_row(log, flight.ticks, study.require, own, study.pointing)._asdict()
             )
         return row.digested(flight.plant.truth.block.tobytes())
-
-    def _fits(self, flight: Flight) -> bool:
-        """Return True if flights like this one may be flown together."""
-        return not self.study.metrics or WIDTH * flight.ticks * row_bytes(flight) < LARGEST_LOGS
 
 
 def _unflown(task: Task, vary: dict[str, Value], error: Exception) -> Row:

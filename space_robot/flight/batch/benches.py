@@ -27,10 +27,10 @@ from space_robot_sim.plant.tick import PlantMemory
 from ..bench import LARGEST_SEED, check_for_bench, seeded
 from ..ending import Ending
 from ..plan import Flight
+from .batch import plant_key
 from .bench_loop import fly_benches
 from .lane_loop import InLanes, measure_lanes
 from .lane_memory import begin_tick, delay_buffers, fill
-from .sharing import plant_key
 
 Array = NDArray[np.float64]
 

@@ -28,7 +28,7 @@ from space_robot_msgs_py.topics import ROOT
 
 DOMAINS = range(1, 101)
 """Domains with all ports below Linux' ephemeral range, which begins at 32768."""
-LOOK_S = 0.05
+POLL_S = 0.05
 DISCOVERY_S = 2.0
 """A node that was there before is discovered in 0.1 to 1.8 s (Fast DDS of Jazzy, measured)."""
 PORT_BASE, PORTS = 7400, 250
@@ -96,14 +96,14 @@ def _take(domain: int, namespace: str, welcome: Collection[str]) -> FileLock | N
     except HeldError as error:
         raise _refusal(domain, namespace, error.holder) from None
     try:
-        _see_that_nobody_is_there(domain, namespace, welcome)
+        _refuse_occupied(domain, namespace, welcome)
     except BaseException:
         lock.release()
         raise
     return lock
 
 
-def _see_that_nobody_is_there(domain: int, namespace: str, welcome: Collection[str]) -> None:
+def _refuse_occupied(domain: int, namespace: str, welcome: Collection[str]) -> None:
     """Refuse foreign nodes; wait for nodes that end because their parent was killed."""
     until = time.monotonic() + TIMEOUT_S
     while nodes := [
@@ -112,7 +112,7 @@ def _see_that_nobody_is_there(domain: int, namespace: str, welcome: Collection[s
         for node in nodes:
             if not node.starter or _is_alive(node.starter) or time.monotonic() > until:
                 raise _refusal(domain, namespace, node)
-        time.sleep(LOOK_S)
+        time.sleep(POLL_S)
 
 
 def _refusal(domain: int, namespace: str, holder: Holder) -> InputError:
@@ -178,7 +178,7 @@ def refuse_publishers(
     is_discovered = False
     while not is_discovered:
         check()
-        time.sleep(LOOK_S)
+        time.sleep(POLL_S)
         is_discovered = time.monotonic() >= joined_at + DISCOVERY_S
         for topic in (topic for topic in topics.RECORDED if topic not in of_others):
             infos = node.get_publishers_info_by_topic(topic.name)

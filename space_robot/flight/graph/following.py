@@ -15,14 +15,11 @@ from ...processes.interruption import exit_code
 from ...scenario.faults import NODE_OF
 from ..plan import Flight
 from .domain import refuse_publishers
-from .injection import Injector
-from .listeners import wait_for
 from .monitor import Event, Monitor
-from .node_names import PLANT, started_nodes
+from .node_names import PLANT, OwnNodes, started_nodes, topics_of, wait_for
 from .node_services import change_state
-from .own_nodes import OwnNodes, topics_of
 from .processes import Command, Graph, node_command
-from .watch import Watch
+from .watch import Injector, Watch
 
 POLL_S = 0.1
 INJECTING_POLL_S = 0.01
@@ -52,11 +49,6 @@ def degradation(
 
     A reference that was held is another motion than the mission's. In lockstep nothing but a fault
     of the mission can bring that about; by the wall clock any delay can.
-
-    Args:
-        nodes: the values that each node reported last, by its name.
-        fault_kinds: what was made to fail.
-        realtime: whether it was flown by the wall clock.
     """
     degraded = Degradation([], [])
     for node, values in nodes.items():
@@ -87,28 +79,14 @@ def follow(
     parameters: dict[str, dict[str, Any]],
     domain: int,
     stopped: list[int],
-    nobody_was_there: bool = False,
+    is_empty: bool = False,
 ) -> dict[str, Any]:
-    """Fly on started nodes until the plant ends the flight; return a report.
-
-    Args:
-        graph: the processes, not configured yet.
-        flight: what they fly.
-        parameters: of each node, for one that is started again.
-        domain: their ROS domain.
-        stopped: filled when the user wants to end.
-        nobody_was_there: in the domain, so there is nobody to be discovered before the flight.
-
-    Raises:
-        InterruptedFlightError: the user has ended the flight.
-        InputError: others publish its topics, or have its nodes' names.
-        FlightError: it cannot go on.
-    """
+    """Fly on started nodes until the plant ends the flight; return a report."""
     monitor = Monitor(domain, flight.scenario.options.namespace, period=flight.period)
     try:
         follower = _Follower(graph, flight, parameters, monitor, stopped)
         with flight_progress(follower.total_s, flight.controller_name) as show:
-            follower.bring_up(show, nobody_was_there)
+            follower.bring_up(show, is_empty)
             follower.until_complete(show)
         return follower.end()
     finally:
@@ -155,11 +133,11 @@ class _Follower:
         """Time of the first tick; 0 before."""
         self._last_s, self._moved_at = 0.0, time.monotonic()
 
-    def bring_up(self, show: FlightProgress, nobody_was_there: bool) -> None:
+    def bring_up(self, show: FlightProgress, is_empty: bool) -> None:
         """Configure all nodes, then activate them, the plant last."""
         show(0.0, "configuring the nodes")
         self._change(self._names, "configure")
-        if not nobody_was_there:
+        if not is_empty:
             node, of_others = self._monitor.node, self._topics_of_others
             refuse_publishers(node, self._joined_at, self._names, of_others, self._check_start)
         for name in self._names:

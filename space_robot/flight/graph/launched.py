@@ -31,9 +31,6 @@ def launched_parameters(
         autostart: whether the nodes configure and activate themselves; they wait for one another.
         folder: for this file, and those that it names.
         of_ros: parameters by node that every ROS node has.
-
-    Raises:
-        InputError: the bag cannot be made.
     """
     check_bag_path(bag)
     compile_kernels(bool(flight.plant.names.actuators))

@@ -17,7 +17,7 @@ from space_robot_msgs_py.wire.definitions import decode
 from space_robot_msgs_py.wire.messages import TELEMETRY_ROWS
 from space_robot_msgs_py.wire.telemetry import TelemetryCodec
 
-from .temporary_node import TemporaryNode
+from .node_services import TemporaryNode
 
 Array = NDArray[np.float64]
 
@@ -45,15 +45,7 @@ class Monitor:
     def __init__(
         self, domain: int, namespace: str = topics.ROOT, name: str = MONITOR, period: float = 0.0
     ) -> None:
-        """Join the graph.
-
-        Args:
-            domain: ROS domain.
-            namespace: of the robot; others are passed over.
-            name: of the node that listens.
-            period: of the plant's ticks, s; 0: not known, and events have the time at which they
-                are heard of.
-        """
+        """Join; ``period``: of ticks, s (0: unknown, events have the time of their reception)."""
         from space_robot_msgs_py.ros.endpoints import PolledCallbackGroup, RawSubscription
 
         self._visitor = TemporaryNode(name, domain, namespace)

@@ -1,13 +1,16 @@
-"""Calls of lifecycle and parameter services of the nodes."""
+"""Temporary node of a command in a graph, and its calls of lifecycle and parameter services."""
 
 from __future__ import annotations
 
 import math
+import os
 import time
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from space_robot_msgs_py.errors import FlightError
+from space_robot_msgs_py.ros.process import set_defaults
+from space_robot_msgs_py.topics import ROOT
 
 TIMEOUT_S = 180.0
 """A node that is configured for the first time with so many joints compiles its kernels first."""
@@ -19,20 +22,50 @@ Check = Callable[[], None]
 """Called while waiting; raises to give up."""
 
 
+def own_name(name: str) -> str:
+    """Return the name of this process's node of a ``name``."""
+    return f"{name}_{os.getpid()}"
+
+
+class TemporaryNode:
+    """Node ``<name>_<pid>`` in a domain, without services or logs."""
+
+    def __init__(self, name: str, domain: int, namespace: str = ROOT) -> None:
+        """Join."""
+        set_defaults()
+        import rclpy
+        from rclpy.context import Context
+        from rclpy.signals import SignalHandlerOptions
+
+        self._context = Context()
+        try:
+            rclpy.init(
+                args=[],
+                context=self._context,
+                domain_id=domain,
+                signal_handler_options=SignalHandlerOptions.NO,
+            )
+        except Exception as error:  # RCLError is private
+            raise FlightError(f"ROS does not start: {str(error).splitlines()[0]}") from None
+        self.node = rclpy.create_node(
+            own_name(name),
+            context=self._context,
+            namespace=namespace,
+            start_parameter_services=False,
+            enable_rosout=False,
+        )
+
+    def leave(self) -> None:
+        """Leave the graph."""
+        self.node.destroy_node()
+        self._context.try_shutdown()
+
+
 def change_state(node: Any, names: Sequence[str], transition: str, check: Check) -> list[str]:
     """Put nodes through a transition of their lifecycle, all at once.
 
-    Args:
-        node: the rclpy node to call from.
-        names: names of the nodes in the namespace of that one.
-        transition: its label, as ``configure``.
-        check: see `Check`.
-
     Returns:
         The nodes that refused.
-
-    Raises:
-        FlightError: a node does not answer.
     """
     from lifecycle_msgs.msg import Transition
     from lifecycle_msgs.srv import ChangeState
@@ -46,17 +79,7 @@ def change_state(node: Any, names: Sequence[str], transition: str, check: Check)
 def set_parameters(
     node: Any, name: str, parameters: Mapping[str, str | int | list[float]], check: Check
 ) -> None:
-    """Set parameters of a live node, all of them or none; return when it has done so.
-
-    Args:
-        node: the rclpy node to call from.
-        name: name of the node whose parameters they are, in the namespace of that one.
-        parameters: their values.
-        check: see `Check`.
-
-    Raises:
-        FlightError: the node refuses, or does not answer.
-    """
+    """Set parameters of a live node, all of them or none; return when it has done so."""
     from rcl_interfaces.srv import SetParametersAtomically
     from rclpy.parameter import Parameter
 
@@ -71,17 +94,7 @@ def set_parameters(
 
 
 def get_parameters(node: Any, name: str, parameters: Sequence[str], check: Check) -> list[Any]:
-    """Return the values of a node's parameters, None of one that it does not have (yet).
-
-    Args:
-        node: the rclpy node to call from.
-        name: name of the node whose parameters they are, in the namespace of that one.
-        parameters: their names.
-        check: see `Check`.
-
-    Raises:
-        FlightError: the node does not answer.
-    """
+    """Return the values of a node's parameters, None of one that it does not have (yet)."""
     from rcl_interfaces.srv import GetParameters
     from rclpy.parameter import parameter_value_to_python
 
@@ -93,13 +106,7 @@ def get_parameters(node: Any, name: str, parameters: Sequence[str], check: Check
 
 
 def call_trigger(node: Any, service: str, check: Check) -> tuple[bool, str]:
-    """Call a service of std_srvs/Trigger, however long it takes; return its success and message.
-
-    Args:
-        node: the rclpy node to call from.
-        service: its name, in the namespace of that one.
-        check: see `Check`.
-    """
+    """Call a service of std_srvs/Trigger, however long it takes; return its success and message."""
     from std_srvs.srv import Trigger
 
     (answer,) = _call(node, Trigger, [service], Trigger.Request(), check, math.inf)

@@ -27,15 +27,16 @@ from ...processes.interruption import handled_signals
 from ...processes.scratch_folder import ScratchFolder
 from ..bag_path import check_bag_path
 from ..compilation import compile_kernels
+from ..flight_messages import bag_remark
 from ..plan import Flight
 from .composed import NAME, composed_command, write_parameters
 from .domain import is_quiet, ros_domain
 from .following import follow
-from .listeners import reset_with, wait_for
 from .monitor import MONITOR
+from .node_names import reset_with, wait_for
 from .node_server import Program
+from .node_services import own_name
 from .processes import Command, Graph, node_command, node_environment
-from .temporary_node import own_name
 
 COMPOSED_DRAIN_S = 0.002
 """Period of the recorder in one process with the other nodes, which wait while it writes."""
@@ -54,12 +55,6 @@ def fly(
     ``graph`` in the report lists the events in the graph; its ``failures`` are reasons why the
     flight is not whole although it is complete.
 
-    Args:
-        flight: a checked plan.
-        bag: the folder to record to.
-        analyze: makes the report of the recorded flight.
-        remarks: on the flight, said once it can begin.
-
     Raises:
         InputError: the bag cannot be made, or the domain is taken.
         FlightError: a node died, the graph stalled, messages were lost, or the user stopped it.
@@ -71,13 +66,13 @@ def fly(
     options = flight.scenario.options
     namespace, own = options.namespace, [f"{node}_node" for node in options.without]
     with ros_domain(options.domain, namespace, own) as domain, stop_signals() as stopped:
-        nobody_is_there = is_quiet(domain)
+        is_empty = is_quiet(domain)
         _claim(bag)
         begin = time.monotonic()
         try:
             within = "" if namespace == topics.ROOT else f" in namespace {namespace}"
             _say(f"flying on ROS_DOMAIN_ID={domain}{within}, recording to {bag}")
-            for remark in remarks:
+            for remark in filter(None, (*remarks, bag_remark(flight))):
                 _say(remark)
             parameters = flight_parameters(flight, bag)
             if flight.scenario.process_faults:  # injected by the clock that the monitor hears
@@ -87,9 +82,7 @@ def fly(
                 parameters = with_files(parameters, flight, folder)
                 commands = _commands(flight, parameters, folder)
                 with Graph(commands, node_environment(domain)) as graph:
-                    what_happened = follow(
-                        graph, flight, parameters, domain, stopped, nobody_is_there
-                    )
+                    what_happened = follow(graph, flight, parameters, domain, stopped, is_empty)
         except BaseException as error:
             if not _has_states(bag, namespace):
                 shutil.rmtree(bag, ignore_errors=True)
@@ -135,11 +128,7 @@ def _command(node: str, values: Mapping[str, Any], namespace: str, folder: Path)
 
 
 def _claim(bag: Path) -> None:
-    """Create the folder of the bag for this flight alone.
-
-    Raises:
-        InputError: the folder exists, created by another flight.
-    """
+    """Create the folder of the bag for this flight alone."""
     try:
         bag.mkdir(parents=True)
     except OSError:
@@ -220,13 +209,7 @@ Parameters = Mapping[str, Mapping[str, Any]]
 
 
 def with_files(parameters: Parameters, flight: Flight, folder: Path) -> dict[str, dict[str, Any]]:
-    """Write the files that nodes read, and return parameters that name them.
-
-    Args:
-        parameters: of every node.
-        flight: their numbers.
-        folder: for the files.
-    """
+    """Write the files that nodes read, and return parameters that name them."""
     named = {node: dict(values) for node, values in parameters.items()}
     numbers = flight.scenario.tree
     for node in ("plant", "controller", "mission"):

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import time
 import uuid
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any
 
 from space_robot_msgs_py.config.validation import full_namespace
@@ -13,12 +15,11 @@ from space_robot_sim.plant.settings import MOST_TICKS
 
 from .domain import domain_asked_for
 from .node_names import MISSION, PLANT
-from .node_services import Check, call_trigger, set_parameters
-from .temporary_node import TemporaryNode
+from .node_services import Check, TemporaryNode, call_trigger, set_parameters
 
 FIND_S = 5.0
 """Discovery of a running node takes 0.1 to 1.8 s."""
-LOOK_S = 0.02
+POLL_S = 0.02
 
 
 def call_simulation(action: str, domain: int | None, namespace: str, ticks: int = 1) -> str:
@@ -36,18 +37,11 @@ def call_simulation(action: str, domain: int | None, namespace: str, ticks: int 
     """
     if not 1 <= ticks <= MOST_TICKS:
         raise InputError(f"--ticks {ticks}: 1 to {MOST_TICKS} were expected")
-    namespace = full_namespace(namespace)
-    domain = domain_asked_for(domain)
-    domain = domain_of_plant(namespace) if domain is None else domain
-    visitor = TemporaryNode("simulation_call", domain, namespace)
-    try:
-        service = f"{PLANT}/{action}"
-        check = _wait_for(visitor.node, service, domain)
+    service = f"{PLANT}/{action}"
+    with _caller("simulation_call", service, domain, namespace) as (node, check):
         if action == "step":
-            set_parameters(visitor.node, PLANT, {"step_ticks": ticks}, check)
-        success, text = call_trigger(visitor.node, service, check)
-    finally:
-        visitor.leave()
+            set_parameters(node, PLANT, {"step_ticks": ticks}, check)
+        success, text = call_trigger(node, service, check)
     if not success:
         raise FlightError(f"{PLANT} cannot {action}: {text}")
     return text
@@ -56,34 +50,33 @@ def call_simulation(action: str, domain: int | None, namespace: str, ticks: int 
 def go_to(segment: str, domain: int | None, namespace: str) -> None:
     """Have the mission of a running graph fly a segment, in place of what it was to fly.
 
-    Args:
-        segment: as in a mission's file, YAML.
-        domain: see `call_simulation`.
-        namespace: see `call_simulation`.
-
     Raises:
         InputError: no mission is there.
         FlightError: the segment is refused; the flight goes on as it was.
     """
+    service = f"{MISSION}/set_parameters_atomically"
+    with _caller("goto", service, domain, namespace) as (node, check):
+        # a text of its own: the mission ignores one that it has had
+        set_parameters(node, MISSION, {"goto": f"{segment} # {uuid.uuid4()}"}, check)
+
+
+@contextmanager
+def _caller(
+    name: str, service: str, domain: int | None, namespace: str
+) -> Iterator[tuple[Any, Check]]:
+    """Join the graph of a service with a node; yield it with a check that the service is there."""
     namespace = full_namespace(namespace)
     domain = domain_asked_for(domain)
-    domain = domain_of_plant(namespace) if domain is None else domain
-    visitor = TemporaryNode("goto", domain, namespace)
+    domain = _domain_of_plant(namespace) if domain is None else domain
+    visitor = TemporaryNode(name, domain, namespace)
     try:
-        check = _wait_for(visitor.node, f"{MISSION}/set_parameters_atomically", domain)
-        # a text of its own: the mission ignores one that it has had
-        text = f"{segment} # {uuid.uuid4()}"
-        set_parameters(visitor.node, MISSION, {"goto": text}, check)
+        yield visitor.node, _wait_for(visitor.node, service, domain)
     finally:
         visitor.leave()
 
 
-def domain_of_plant(namespace: str) -> int:
-    """Return the domain of the only plant of a ``namespace`` on this machine.
-
-    Raises:
-        InputError: there is none, or more than one.
-    """
+def _domain_of_plant(namespace: str) -> int:
+    """Return the domain of the only plant of a ``namespace`` on this machine."""
     domains = sorted(domain for domain, _ in living_nodes(PLANT, namespace))
     if len(domains) != 1:
         name = f"{namespace.rstrip('/')}/{PLANT}"
@@ -100,7 +93,7 @@ def _wait_for(node: Any, service: str, domain: int) -> Check:
         if time.monotonic() > until:
             name = node.resolve_service_name(service)
             raise InputError(f"no service {name} in ROS domain {domain}: is a graph flying there?")
-        time.sleep(LOOK_S)
+        time.sleep(POLL_S)
     name = service.rpartition("/")[0]
     lock = node_lock(domain, node.resolve_service_name(name))
     is_here = is_held(lock)  # on this machine: discovery lists a killed node for another 20 s

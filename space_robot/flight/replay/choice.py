@@ -10,30 +10,30 @@ from typing import Any
 import yaml
 
 from space_robot_control.allocation.settings import assumed_actuators
-from space_robot_control.controller.gains import build_law, build_laws, split_gains
-from space_robot_control.controller.law_choice import NoLaw, parse_swaps
+from space_robot_control.controller.controller import Controller
+from space_robot_control.controller.gains import build_law, build_laws, check_gains, split_gains
+from space_robot_control.controller.law_choice import LawChoice, NoLaw, parse_swaps
 from space_robot_control.controller.settings import (
     DEFAULT,
     ControllerNodeSettings,
     gain_files,
     gains_as_path,
 )
+from space_robot_control.controller.supervisor import Supervisor
+from space_robot_control.flight_code.supervisors import supervisor_of
 from space_robot_control.laws import ControlLaw, find_law
 from space_robot_control.laws.names import is_plain, require_shipped_file, require_shipped_law
-from space_robot_model.robot import Robot
 from space_robot_model.robot.find import ROBOT_STEM, find_robot
 from space_robot_msgs_py.config.files import Tree, flatten
 from space_robot_msgs_py.config.validation import one_of
 from space_robot_msgs_py.errors import InputError
-from space_robot_msgs_py.samples import LawInForce, RobotNames
+from space_robot_msgs_py.samples import LawInForce
 
 NODE = ControllerNodeSettings.node
-OF_THE_GRAPH = ("wait_for", "listener_timeout", "fifo_priority", "autostart")
-"""Parameters that say how a controller fits into its graph; a replay has another."""
 
 
 class ControllerChoice:
-    """The parameters of the node to start: the recorded ones, what the user gives over them.
+    """The controller that answers a replay: the recorded one, with what the user changes of it.
 
     Robot and gains are the recorded numbers, whatever the files of this installation say today.
     """
@@ -48,14 +48,14 @@ class ControllerChoice:
         trust: bool = False,
         laws: Sequence[LawInForce] = (),
     ) -> None:
-        """Put the parameters together and check them.
+        """Resolve the parameters.
 
         Args:
             flight: the description in the bag; empty for a bag of another recorder.
-            folder: where to write recorded numbers as files, which the node will read.
+            folder: for the recorded robot and actuators, as files that parameters name.
             controller: law to fly (empty: the recorded one).
             gains: gain set to fly (empty: the recorded one).
-            chosen: further parameters of the node, over the recorded ones.
+            chosen: further parameters of the controller, over the recorded ones.
             trust: whether modules and files that the description names may be opened.
             laws: in force in flight, by rising tick: of a bag without a description the first one
                 is the law that flew, with its gains.
@@ -69,7 +69,7 @@ class ControllerChoice:
         chosen = chosen or {}
         controller = str(chosen.get("controller", controller))
         gains = str(chosen.get("gains", gains))
-        flown = recorded_parameters(flight)
+        flown = flight.get("parameters", {}).get(NODE, {})
         named = controller or flown.get("controller") or flight.get("controller")
         if named == NoLaw.name:
             raise InputError(
@@ -100,21 +100,21 @@ class ControllerChoice:
         recorded_gains = flight.get("gains_used", {})
         own, of_laws = split_gains(flown)
         self.parameters: dict[str, Any] = {**dict(flatten(own)), **self._robot(flown)}
-        """The node's parameters, by dotted name."""
+        """By dotted name, gains included."""
         if not gains:
             if recorded_gains and is_same_law:
                 of_laws = {law.name: dict(recorded_gains), **of_laws}
-            self.parameters |= self._gains(of_laws)
+            self.parameters |= self._recorded_gains(of_laws)
         if "actuators" not in self._said:
             self.parameters |= self._actuators(flown)
         if "navigation_sensors" not in self._said:
-            self.parameters |= recorded_navigation(flight)
+            self.parameters |= _recorded_navigation(flight)
         self.parameters |= self._said
         if not trust:
             self._check_files(flown)
         self.swaps = [text for text in self.parameters.get("swaps", []) if text.strip()]
         """Laws swapped to in flight."""
-        self.robot, self.names, now = self._check()
+        now = self._resolve()
         self.is_as_flown = is_same_law and (
             not gains or gains == flown.get("gains") or _same(now.gain_values, recorded_gains)
         )
@@ -122,11 +122,27 @@ class ControllerChoice:
         self.follows_flight = is_same_law and "swaps" not in chosen
         """True if laws and gains change as they did in flight."""
 
-    def law_parameters(self, law: LawInForce) -> dict[str, str | list[float]]:
-        """Return what to set to have a law of the flight in force; what the user gave stays."""
-        gains = {f"{law.name}.{gain}": list(values) for gain, values in law.gains.items()}
-        kept = {name: gains[name] for name in gains if name not in self._said}
-        return {"controller": law.name, **(kept if self.is_as_flown else {})}
+    def build_supervisor(self) -> tuple[Supervisor, LawChoice, dict[str, ControlLaw]]:
+        """Build a supervisor without memory, the choice of its laws, and these by name."""
+        settings = self.settings
+        laws = build_laws(settings, self._axes, self._gains)
+        swaps = parse_swaps(settings.swaps, settings.period)
+        first = next(iter(laws.values()))
+        controller = Controller.from_settings(self.robot, first, settings, self._hardware)
+        choice = LawChoice(first, [(tick, laws[name]) for tick, name in swaps])
+        return supervisor_of(controller, list(laws.values()), settings), choice, laws
+
+    def set_gains(self, law: ControlLaw, flown: LawInForce) -> None:
+        """Give a law the gains of the flight; those that the user gave stay."""
+        if self.is_as_flown:
+            kept = {
+                gain: list(values)
+                for gain, values in flown.gains.items()
+                if f"{law.name}.{gain}" not in self._said
+            }
+            law.gain_values = check_gains(
+                {**law.gain_values, **kept}, type(law), self._axes, "the bag"
+            )
 
     def _check_laws(self, named: str, flown: Mapping[str, Any]) -> None:
         """Check that no law but those shipped, or given by the user, is imported."""
@@ -165,7 +181,7 @@ class ControllerChoice:
         _write(path, {"plant_node": {"ros__parameters": content}})
         return {"actuators": str(path)}
 
-    def _gains(self, of_laws: Mapping[str, Tree]) -> dict[str, Any]:
+    def _recorded_gains(self, of_laws: Mapping[str, Tree]) -> dict[str, Any]:
         """The recorded gains by law, in place of a gain set that is not on this machine."""
         parameters = dict(flatten(of_laws))
         if of_laws and set(map(_law_of_swap, self._flown_swaps)) <= set(of_laws):
@@ -179,37 +195,29 @@ class ControllerChoice:
                 return bool(gain_files(str(robot), self.gains_name))
         return False
 
-    def _check(self) -> tuple[Robot, RobotNames, ControlLaw]:
-        """The robot, the names in its messages, and the law with the gains of its set."""
-        own, gains = split_gains(self.parameters)
-        settings = ControllerNodeSettings.resolve(own)
-        robot = find_robot(settings.robot)
-        axes = robot.n + 3
+    def _resolve(self) -> ControlLaw:
+        """Resolve settings, robot and actuators; return the law with the gains of its set."""
+        own, self._gains = split_gains(self.parameters)
+        self.settings = settings = ControllerNodeSettings.resolve(own)
+        self.robot = find_robot(settings.robot)
+        self._axes = axes = self.robot.n + 3
         flown_axes = {len(values) for values in self._flight.get("gains_used", {}).values()}
         if "robot" not in self.parameters and flown_axes - {1, axes}:
             raise InputError(
                 f"the bag does not say which robot was flown, with {max(flown_axes) - 3} joints: "
                 "name it with --set controller.robot=NAME"
             )
-        laws = build_laws(settings, axes, gains)
+        laws = build_laws(settings, axes, self._gains)
         for swap in parse_swaps(settings.swaps, settings.period):
             one_of(swap.name, laws, "controller", " of swaps")
-        names = assumed_actuators(settings.actuators, robot).robot_names(robot)
+        self._hardware = assumed_actuators(settings.actuators, self.robot)
+        self.names = self._hardware.robot_names(self.robot)
         if "gains" in self._said:
-            return robot, names, build_law(settings.controller, settings, axes)
-        return robot, names, next(iter(laws.values()))
+            return build_law(settings.controller, settings, axes)
+        return next(iter(laws.values()))
 
 
-def recorded_parameters(flight: Mapping[str, Any]) -> dict[str, Any]:
-    """Return what the flown controller was given; older bags have names only."""
-    recorded = flight.get("parameters", {}).get(NODE)
-    if recorded is None:
-        names = ("controller", "gains", "robot", "swaps", "period")
-        recorded = {name: flight[name] for name in names if name in flight}
-    return {name: value for name, value in recorded.items() if name not in OF_THE_GRAPH}
-
-
-def recorded_navigation(flight: Mapping[str, Any]) -> dict[str, Any]:
+def _recorded_navigation(flight: Mapping[str, Any]) -> dict[str, Any]:
     """Return the numbers of the navigation filter that flew, as parameters; no file is read."""
     recorded = flight.get("navigation_filter", {})
     numbers = {f"navigation_filter.{name}": value for name, value in recorded.items()}

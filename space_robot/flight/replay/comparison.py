@@ -1,14 +1,113 @@
-"""Comparison of recorded and replayed commands, bit by bit. Independent of ROS."""
+"""Comparison of recorded and replayed commands, bit by bit."""
 
 from __future__ import annotations
 
-from collections.abc import Collection
+import struct
+from array import array
+from collections.abc import Collection, Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .commands import Array, Form, ReplayedCommands, Ticks, number
+from space_robot_msgs_py import topics
+from space_robot_msgs_py.errors import MessageError
+from space_robot_msgs_py.samples import Timebase
+from space_robot_msgs_py.wire.cdr import header_stamp_ns
+from space_robot_msgs_py.wire.codecs import FOREIGN, CompiledCodec
+from space_robot_msgs_py.wire.definitions import decode
+from space_robot_msgs_py.wire.messages import describe, name_order
+
+Array = NDArray[np.float64]
+Ticks = NDArray[np.int64]
+
+
+class Form(NamedTuple):
+    """All of a command but its stamp and its torques; the lists as text."""
+
+    frame_id: str
+    name: str
+    position: str = "[]"
+    velocity: str = "[]"
+    effort: str = ""
+    """Only where the torques do not fit the robot's axes."""
+
+
+class ReplayedCommands(NamedTuple):
+    """One command a tick, by rising tick."""
+
+    ticks: Ticks
+    """(N,)"""
+    torque: Array
+    """(N, m) N m, in the order of the robot's axes; NaN where a message has others."""
+    forms: Mapping[int, Form]
+    """By tick, of those whose form is not that of this project."""
+    unreadable: int = 0
+    """Messages that were no command at all, or not of a whole tick."""
+
+    def within(self, start: int, stop: float) -> ReplayedCommands:
+        """Those of the ticks from ``start`` to before ``stop``."""
+        inside = (self.ticks >= start) & (self.ticks < stop)
+        return self._replace(ticks=self.ticks[inside], torque=self.torque[inside])
+
+
+class CommandList:
+    """Serialized /command messages, kept as arrays of about 80 bytes each."""
+
+    def __init__(self, axis_names: tuple[str, ...], timebase: Timebase) -> None:
+        self._names, self._timebase = axis_names, timebase
+        self._usual = CompiledCodec(describe(topics.COMMAND, axis_names, timebase))
+        self._torque = np.zeros(len(axis_names))
+        self._ticks, self._torques = array("q"), array("d")
+        self._forms: dict[int, Form] = {}
+        self._unreadable = 0
+
+    def add(self, data: bytes) -> None:
+        """Add a message."""
+        try:
+            form = None
+            if (stamp_ns := self._usual.read(data, self._torque)) == FOREIGN:
+                stamp_ns, form = header_stamp_ns(data), self._read_foreign(data)
+            tick = self._timebase.tick(stamp_ns)
+        except MessageError:
+            self._unreadable += 1
+            return
+        if form:
+            self._forms[len(self._ticks)] = form
+        self._ticks.append(tick)
+        self._torques.frombytes(self._torque.tobytes())
+
+    def _read_foreign(self, data: bytes) -> Form:
+        """Read the torques of a message in another layout; return its form."""
+        message = decode(data, topics.COMMAND.type)
+        efforts, names = message.effort, list(message.name)
+        texts = _text(message.position), _text(message.velocity)
+        form = Form(message.header.frame_id, str(names), *texts)
+        try:
+            order = name_order(names, self._names, topics.COMMAND.full_name)
+            self._torque[:] = efforts[order]
+        except (MessageError, IndexError):
+            self._torque[:] = np.nan
+            return form._replace(effort=_text(efforts))
+        return form
+
+    def commands(self) -> ReplayedCommands:
+        """Return the commands; of several for one tick the first."""
+        ticks, first = np.unique(np.frombuffer(self._ticks, np.int64), return_index=True)
+        torques = np.frombuffer(self._torques, np.float64).reshape(-1, len(self._names))
+        kept = set(first.tolist()) & self._forms.keys()
+        forms = {self._ticks[i]: self._forms[i] for i in kept}
+        return ReplayedCommands(ticks, torques[first], forms, self._unreadable)
+
+
+def number(value: float) -> float | str:
+    """A number to show: a NaN, of which there are many, by its bits."""
+    (bits,) = struct.unpack("<Q", struct.pack("<d", value))
+    return float(value) if value == value else f"nan 0x{bits:016x}"
+
+
+def _text(values: Any) -> str:
+    return str([number(value) for value in np.asarray(values, np.float64)])
 
 
 class Difference(NamedTuple):
@@ -75,8 +174,7 @@ class Comparison:
             recorded.ticks[is_played], replayed.ticks, assume_unique=True, return_indices=True
         )
         """(K,) Ticks with both commands."""
-        self._at, self._again = np.flatnonzero(is_played)[at], again
-        self.recorded: Array = recorded.torque[self._at]
+        self.recorded: Array = recorded.torque[is_played][at]
         """(K, m) in `units`."""
         self.replayed: Array = replayed.torque[again]
         """(K, m) in `units`."""
@@ -85,19 +183,13 @@ class Comparison:
         self.unrecorded: Ticks = np.setdiff1d(replayed.ticks, recorded.ticks)
         """Ticks with a command now that have none in the bag."""
         self._same_torque = _bits(self.recorded) == _bits(self.replayed)
-        self.equal: NDArray[np.bool_] = self._same_torque.all(axis=1) & self._same_form()
+        other = [
+            tick
+            for tick in {*recorded.forms, *replayed.forms}
+            if recorded.forms.get(tick) != replayed.forms.get(tick)
+        ]
+        self.equal: NDArray[np.bool_] = self._same_torque.all(axis=1) & ~np.isin(self.ticks, other)
         """(K,) whether every field is the same, to the last bit."""
-
-    def _same_form(self) -> NDArray[np.bool_]:
-        numbers: dict[Form, int] = {}
-        recorded, replayed = (
-            np.array([numbers.setdefault(form, len(numbers)) for form in forms], np.intp)
-            for forms in (self._recorded.forms, self._replayed.forms)
-        )
-        same: NDArray[np.bool_] = (
-            recorded[self._recorded.form[self._at]] == replayed[self._replayed.form[self._again]]
-        )
-        return same
 
     @property
     def is_identical(self) -> bool:
@@ -130,13 +222,12 @@ class Comparison:
         if self.equal.all():
             return None
         k = int(np.argmin(self.equal))
-        forms = (
-            self._recorded.forms[self._recorded.form[self._at[k]]],
-            self._replayed.forms[self._replayed.form[self._again[k]]],
-        )
+        tick = int(self.ticks[k])
+        usual = Form(topics.BASE_FRAME, str(list(self.axis_names)))
+        one, other = (c.forms.get(tick, usual) for c in (self._recorded, self._replayed))
         differences = [
             Difference(field, a, b)
-            for field, a, b in zip(forms[0]._fields, *forms, strict=True)
+            for field, a, b in zip(usual._fields, one, other, strict=True)
             if a != b
         ]
         differences += [
@@ -147,7 +238,7 @@ class Comparison:
             )
             for i in np.flatnonzero(~self._same_torque[k])
         ]
-        return int(self.ticks[k]), differences
+        return tick, differences
 
     def report(self, period: float) -> dict[str, Any]:
         """The numbers, for JSON and the table; ``period``: of a tick, s."""

@@ -28,7 +28,7 @@ from space_robot_msgs_py.samples import LawInForce, in_order
 from space_robot_msgs_py.topics import Topic
 from space_robot_msgs_py.wire.telemetry import LawCodec
 
-from .commands import CommandList, ReplayedCommands
+from .comparison import CommandList, ReplayedCommands
 
 COMPARED = (
     *topics.STATES,
@@ -48,42 +48,24 @@ class StateMessages(NamedTuple):
     """One of each part that was asked for, in that order."""
 
 
-class ReferenceMessage(NamedTuple):
-    """A message of the reference."""
-
-    tick: int
-    """The tick of its first point."""
-    topic: Topic
-    data: bytes
-
-
 class Recording:
-    """Messages of a bag received and sent by the controller. Independent of ROS."""
+    """Messages of a bag that its controller received and sent."""
 
     def __init__(
         self, path: Path, remap: Mapping[str, str] | None = None, namespace: str | None = None
     ) -> None:
-        """Open the bag in ``path``.
-
-        Args:
-            path: the bag.
-            remap: our topic by the bag's.
-            namespace: of the robot; None: of the only one in the bag.
-
-        Raises:
-            InputError: no bag is there, it cannot be read, or has no states or references.
-        """
+        """Open a bag; ``remap`` and ``namespace``: see `read_flight`."""
         self.path = path
         with self._readable():
             self._bag = open_bag(path)
             self._selection = Selection(self._bag, remap or {}, namespace)
             flight = read_description(self._bag.custom_data())
             counts: Counter[Topic] = Counter()
-            states = _Steps()
+            stamps_ns = [np.empty(0, np.int64)]
             for topic, batch in self._selection.batches():
                 counts[topic] += len(batch)
                 if topic is topics.JOINT_STATES:
-                    states.take(batch.stamps)
+                    stamps_ns.append(batch.stamps)
             for topic in REQUIRED:
                 if not counts[topic]:
                     raise missing(topic, self._bag, self._selection)
@@ -114,7 +96,8 @@ class Recording:
         sent."""
         recorded = self._selection.recorded() or {}
         is_short = any(recorded.get(topic.full_name, 0) > counts[topic] for topic in COMPARED)
-        has_gaps = not (excused or states.are_even(self.timebase.period_ns, bool(flight)))
+        steps = np.diff(np.concatenate(stamps_ns), prepend=-self.timebase.period_ns)
+        has_gaps = not excused and np.any(steps[0 if flight else 1 :] != self.timebase.period_ns)
         self.is_whole = not (is_short or has_gaps or self._bag.incomplete) and self.is_finished
         """True if the bag holds all that the controller was sent and answered, as far as anybody
         knows."""
@@ -144,8 +127,8 @@ class Recording:
     ) -> Iterator[StateMessages]:
         """States of the ticks from ``start`` to before ``stop``, as they were sent.
 
-        One of which any of the ``parts`` is missing, or whose stamp is none, is passed over; of a
-        damaged bag also one without its reference, which the controller would wait for.
+        One without any of the ``parts``, or with a wrong stamp, is passed over; of a damaged bag
+        also one without its reference, for which the controller would have held an earlier one.
         """
         queues: dict[Topic, deque[tuple[int, bytes]]] = {topic: deque() for topic in parts}
         for topic, tick, data in self._of_ticks(*parts):
@@ -172,20 +155,17 @@ class Recording:
         whole = self._whole
         return whole is None or (tick < len(whole) and bool(whole[tick]))
 
-    def references(self, topic: Topic, start: int = 0) -> Iterator[ReferenceMessage]:
-        """Messages of half the reference, from the last one that begins by tick ``start``."""
-        begun: ReferenceMessage | None = None
+    def references(self, topic: Topic, start: int = 0) -> Iterator[tuple[int, bytes]]:
+        """First tick and data of half the reference, from the last message begun by ``start``."""
+        begun: list[tuple[int, bytes]] = []
         for _, tick, data in self._of_ticks(topic):
-            reference = ReferenceMessage(tick, topic, data)
-            if reference.tick <= start:
-                begun = reference
+            if tick <= start:
+                begun = [(tick, data)]
                 continue
-            if begun:
-                yield begun
-                begun = None
-            yield reference
-        if begun:
-            yield begun
+            yield from begun
+            begun = []
+            yield tick, data
+        yield from begun
 
     def _of_ticks(self, *wanted: Topic) -> Iterator[tuple[Topic, int, bytes]]:
         """Yield the messages of some topics whose stamps are whole ticks, with these."""
@@ -209,25 +189,3 @@ class Recording:
         except OSError as error:
             why = error.strerror or error
             raise InputError(f"{self.path}: cannot be read ({why})") from None
-
-
-class _Steps:
-    """The steps between the stamps of a topic, which a gap makes uneven."""
-
-    def __init__(self) -> None:
-        self._first = self._last = -1
-        self._found: set[int] = set()
-
-    def take(self, stamps_ns: NDArray[np.int64]) -> None:
-        """Take the next stamps."""
-        if not len(stamps_ns):
-            return
-        if self._first < 0:
-            self._first = self._last = int(stamps_ns[0])
-            stamps_ns = stamps_ns[1:]
-        self._found |= set(np.unique(np.diff(stamps_ns, prepend=self._last)).tolist())
-        self._last = int(stamps_ns[-1]) if len(stamps_ns) else self._last
-
-    def are_even(self, period_ns: int, begins_at_zero: bool) -> bool:
-        """Return True if every tick has its stamp, from the first (or tick 0) on."""
-        return self._found <= {period_ns} and (self._first == 0 or not begins_at_zero)

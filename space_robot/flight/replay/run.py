@@ -1,45 +1,178 @@
-"""Replay of a bag: start a controller, play, compare, report."""
+"""Replay of a bag: its states and references, answered anew by a supervisor in this process."""
 
 from __future__ import annotations
 
-import gc
+import math
 import time
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, field
+from itertools import islice
 from pathlib import Path
+from typing import Any
 
-from space_robot_msgs_py.bag.law_history import within
-from space_robot_msgs_py.errors import FlightError, InputError
-from space_robot_msgs_py.samples import LawInForce
+import numpy as np
+from numpy.typing import NDArray
+
+from space_robot_control.controller.reference_buffer import ReferenceBuffer
+from space_robot_control.controller.supervisor import StateResponder
+from space_robot_control.controller.tick import NEW
+from space_robot_control.laws.base import LawError
+from space_robot_msgs_py import topics
+from space_robot_msgs_py.bag.law_history import as_data, within
+from space_robot_msgs_py.config.validation import one_of
+from space_robot_msgs_py.errors import FlightError, InputError, MessageError, SpaceRobotError
+from space_robot_msgs_py.samples import LawInForce, RobotState
 from space_robot_msgs_py.simulated_time import LATEST_S, check_time, tick_from
 from space_robot_msgs_py.topics import Topic
 from space_robot_msgs_py.wire.codecs import StateCodec
+from space_robot_msgs_py.wire.telemetry import ReferenceCodec
 
-from ...console.progress import FlightProgress, flight_progress
+from ...console.progress import flight_progress
 from ...processes.scratch_folder import ScratchFolder
 from ..compilation import compile_kernels
-from ..graph.domain import ros_domain
-from ..graph.following import InterruptedFlightError
-from ..graph.node_services import change_state, set_parameters
-from ..graph.orchestrator import require_ros, stop_signals
-from ..graph.processes import Graph, NodeProcess, node_command, node_environment
 from .choice import ControllerChoice
-from .commands import CommandList, ReplayedCommands, Ticks
-from .comparison import Comparison
-from .outcome import Replay, ReplayOptions
-from .player import CONTROLLER, REFERENCES, Player
+from .comparison import CommandList, Comparison, ReplayedCommands
 from .recording import Recording, StateMessages
 
-SHOW_S = 0.2
+SHOW_TICKS = 500
+AHEAD = 64
+"""Messages of the reference that are looked through for one that overwrites earlier ones."""
+
+
+@dataclass(frozen=True)
+class ReplayOptions:
+    """Options of a replay."""
+
+    bag: Path
+    controller: str = ""
+    """Law that answers (empty: the recorded one)."""
+    gains: str = ""
+    """Gains of the law (empty: the recorded ones)."""
+    parameters: Mapping[str, Any] = field(default_factory=dict)
+    """Further parameters of the controller."""
+    start_s: float = 0.0
+    """Simulated time of the first state."""
+    end_s: float = math.inf
+    """Simulated time before which the last state lies."""
+    remap: Mapping[str, str] = field(default_factory=dict)
+    """Our topic by the bag's."""
+    namespace: str | None = None
+    """Namespace of the robot in the bag (None: the only one)."""
+    trust: bool = False
+    """True if modules and files that the bag names may be opened."""
+
+
+@dataclass(frozen=True)
+class Replay:
+    """The outcome of a replay."""
+
+    options: ReplayOptions
+    choice: ControllerChoice
+    recording: Recording
+    comparison: Comparison
+    laws: tuple[LawInForce, ...]
+    """Laws in force in the replayed part of the flight."""
+    skipped: int
+    """States that the controller did not answer in flight, and was not sent now."""
+    elapsed_s: float
+    error: SpaceRobotError | None
+    """Error that ended the replay early."""
+
+    @property
+    def is_judged(self) -> bool:
+        """True if the commands are to be the recorded ones."""
+        return self.choice.is_as_flown and self.recording.has_commands
+
+    @property
+    def has_passed(self) -> bool:
+        """True if nothing is other than expected; another law is not expected to agree.
+
+        A bag that is unfinished, or has lost something, does not pass.
+        """
+        is_same = self.comparison.is_identical and self.recording.is_whole
+        return self.error is None and (is_same or not self.is_judged)
+
+    @property
+    def differs(self) -> bool:
+        """True if a command differs though the controller was sent all that it was in flight.
+
+        After a gap in a damaged bag it was not, and may command something else.
+        """
+        first = self.comparison.first_difference()
+        return first is not None and first[0] < self.recording.first_gap
+
+    def report(self) -> dict[str, Any]:
+        """The report, for JSON and the table."""
+        flight, options = self.recording.flight, self.options
+        numbers = self.comparison.report(self.recording.timebase.period)
+        return {
+            "bag": str(options.bag),
+            "recorded": {
+                **{key: flight.get(key) for key in ("controller", "gains", "swaps")},
+                "laws": as_data(self.laws, self.recording.timebase),
+            },
+            "replayed": {
+                "controller": self.choice.law_name,
+                "gains": self.choice.gains_name,
+                "swaps": self.choice.swaps,
+                "as_in_flight": bool(self.choice.follows_flight and self.laws),
+                "set": dict(options.parameters),
+            },
+            "start_s": options.start_s,
+            "end_s": options.end_s if math.isfinite(options.end_s) else None,
+            **numbers,
+            "has_commands": self.recording.has_commands,
+            "judged": self.is_judged,
+            "differs": self.differs,
+            "first_gap_s": self._seconds(self.recording.first_gap),
+            "whole": self.recording.is_whole,
+            "unfinished": self.recording.unfinished,
+            "damage": list(self.recording.damage),
+            "passed": self.has_passed,
+            "reasons": [*self._reasons()],
+            "skipped": self.skipped,
+            "elapsed_s": self.elapsed_s,
+            "ticks_per_s": numbers["played"] / self.elapsed_s if self.elapsed_s else None,
+            "error": str(self.error) if self.error else None,
+        }
+
+    def _seconds(self, tick: float) -> float | None:
+        return round(tick * self.recording.timebase.period, 9) if math.isfinite(tick) else None
+
+    def _reasons(self) -> Iterator[str]:
+        """Yield reasons why an unchanged controller may give different bits."""
+        flight, has_laws = self.recording.flight, bool(self.laws)
+        if self.options.start_s > 0.0:
+            yield (
+                "it does not begin where the flight did: laws with memory start afresh, and every "
+                "law takes over from the applied torque within 20 ms"
+            )
+        faults = " ".join(flight.get("faults", []))
+        if not has_laws and (flight.get("restart_controller") or "_controller" in faults):
+            yield "the controller was stopped or started again in flight, the replayed one is not"
+        if not has_laws:
+            yield "the bag has no record of laws and gains changed in flight with `ros2 param set`"
+        if lost := self.recording.lost_commands:
+            yield (
+                f"the recorder missed {lost} commands: the states that they answered are not known,"
+                " and the replayed controller was not sent them"
+            )
+        if "_mission" in faults:
+            yield "the mission was killed or stopped: references may have come late in flight"
+        if not flight:
+            law = "" if has_laws else "law, gains, "
+            yield f"the bag does not say what was flown: {law}robot and parameters are a guess"
+        if not self.recording.is_whole:
+            yield (
+                "the bag is not whole: after a gap the controller has not been sent all that it "
+                "was sent in flight"
+            )
 
 
 class RecordedLaws:
-    """Sets, before each state, the law and gains that the live controller had in flight.
-
-    In flight they changed between two states, too, so the replayed controller takes over, and
-    remembers, as the flown one did. Independent of ROS.
-    """
+    """Puts in force, before each state, the law and gains that the controller had in flight."""
 
     def __init__(
         self,
@@ -49,10 +182,8 @@ class RecordedLaws:
     ) -> None:
         """Begin before the first state.
 
-        Args:
-            laws: by rising tick.
-            put: puts a law in force; returns when that has been done.
-            start_again: gives the controller a fresh memory, as a restart did in flight.
+        ``laws``: by rising tick; ``put``: puts one in force; ``start_again``: gives the controller
+        a fresh memory, as a restart did in flight.
         """
         self._coming = deque(laws)
         self._put, self._start_again = put, start_again
@@ -72,12 +203,94 @@ class RecordedLaws:
         self._has_begun = True
 
 
+class ReferenceStream:
+    """One half of the recorded reference, decoded as late as the flown controller needed it.
+
+    A message that begins before others that were sent earlier overwrites their rows, as after a
+    ``goto``: those are decoded before it.
+    """
+
+    def __init__(
+        self,
+        messages: Iterator[tuple[int, bytes]],
+        decode: Callable[[bytes], tuple[int, NDArray[np.float64]]],
+        add: Callable[[int, NDArray[np.float64]], None],
+    ) -> None:
+        self._messages, self._decode, self._add = messages, decode, add
+        self._ahead: deque[tuple[int, bytes]] = deque()
+        self._look_ahead()
+
+    def feed(self, tick: int) -> None:
+        """Decode what was sent for the ticks up to ``tick``."""
+        while self._due <= tick:
+            with suppress(MessageError):  # the flown controller could not use it either
+                self._add(*self._decode(self._ahead.popleft()[1]))
+            self._look_ahead()
+
+    def _look_ahead(self) -> None:
+        self._ahead.extend(islice(self._messages, AHEAD - len(self._ahead)))
+        self._due = min((tick for tick, _ in self._ahead), default=math.inf)
+
+
+class ReplayedController:
+    """The controller's part of a node: references, laws, and the answer to each state."""
+
+    def __init__(self, choice: ControllerChoice, recording: Recording, start: int) -> None:
+        """Begin before the state of tick ``start``."""
+        self._choice, robot = choice, choice.robot
+        self.answers = CommandList(choice.names.commanded, recording.timebase)
+        self._references = ReferenceBuffer(robot.n)
+        codec = ReferenceCodec(robot.joint_names, recording.timebase)
+        self._streams = [
+            ReferenceStream(recording.references(topic, start), decode, add)
+            for topic, decode, add in (
+                (topics.REFERENCE_JOINTS, codec.decode_joints, self._references.add_joints),
+                (topics.REFERENCE_BASE, codec.decode_base, self._references.add_base),
+            )
+        ]
+        self._states = StateCodec(choice.names, recording.timebase)
+        self._state = RobotState.allocate(robot.n)
+        self.start_again()
+
+    def start_again(self) -> None:
+        """Begin with a fresh memory, as a controller that was started again in flight."""
+        supervisor, self._laws, self._by_name = self._choice.build_supervisor()
+        self._responder = StateResponder(
+            supervisor, self._laws, self._references, self._choice.settings
+        )
+
+    def put(self, flown: LawInForce) -> None:
+        """Put a law of the flight in force."""
+        law = self._by_name[one_of(flown.name, self._by_name, "law", " in the bag")]
+        self._choice.set_gains(law, flown)
+        self._laws.choose(law)
+
+    def answer(self, state: StateMessages) -> None:
+        """Answer a state, if the controller takes it."""
+        for stream in self._streams:
+            stream.feed(state.tick)
+        try:
+            for topic, data in zip(self._states.control_topics, state.messages, strict=True):
+                self._states.decode(topic, data, self._state)
+        except MessageError:
+            return
+        tick, references = state.tick, self._references
+        if self._responder.judge_stamp(tick) != NEW:
+            return
+        reference = references.at(tick) if references.covers(tick) else references.hold(tick)
+        if reference is None:
+            return
+        for topic, data in self._responder.messages(tick, self._state, reference):
+            if topic is topics.COMMAND:
+                self.answers.add(data)
+
+
 def replay(options: ReplayOptions) -> Replay:
-    """Play a bag to a new controller and compare its commands with the recorded ones.
+    """Answer the states of a bag anew, and compare the commands with the recorded ones.
 
     Raises:
-        InputError: bag or options cannot be used; nothing was started.
-        FlightError: the controller did not start.
+        InputError: bag or options cannot be used.
+        FlightError: the controller failed at the first state.
     """
     recording = Recording(options.bag, options.remap, options.namespace)
     laws = recording.laws()
@@ -91,7 +304,6 @@ def replay(options: ReplayOptions) -> Replay:
             options.trust,
             laws,
         )
-        require_ros()
         return _Run(options, recording, choice, laws).run()
 
 
@@ -115,8 +327,6 @@ class _Run:
             raise InputError(f"{options.bag}: no states in the part to be replayed")
         self._laws = within(laws, self._start, self._stop)
         self._skipped = 0
-        self._progress: FlightProgress | None = None
-        self._shown_at = 0.0
 
     def _choose_parts(self) -> tuple[Topic, ...]:
         """Return the parts of a state that the controller needs."""
@@ -137,69 +347,46 @@ class _Run:
         return commands.within(self._start, self._stop)
 
     def run(self) -> Replay:
-        """Start the controller, play, stop it, compare."""
+        """Answer every state, and compare."""
         options, recording, choice = self._options, self._recording, self._choice
-        names, error = choice.names.commanded, None
-        answers = CommandList(names, recording.timebase)
-        parameters = dict(choice.parameters)
-        if options.rate is None and "reference_timeout" not in options.parameters:
-            # there is time to wait; by the wall clock, where the flight may have been, there is not
-            parameters.pop("reference_timeout", None)
         compile_kernels(bool(choice.names.actuators))
-        command = {"controller": node_command("controller", {**parameters, "autostart": False})}
-        with (
-            ros_domain(options.domain) as domain,
-            stop_signals() as stopped,
-            Player(domain, answers, self._parts) as player,
-            Graph(command, node_environment(domain)) as graph,
-        ):
-            controller = graph.nodes["controller"]
-            player.check = lambda: _check(controller, stopped)
-            _bring_up(controller, player)
-            begin = time.perf_counter()
-            with self._show() as show, _frozen():
-                try:
-                    self._play(player, show)
-                except FlightError as ended:
-                    error = ended
-            elapsed = time.perf_counter() - begin
-        played = player.played
-        if error and not len(played):
+        controller = ReplayedController(choice, recording, self._start)
+        laws = RecordedLaws(
+            self._laws if choice.follows_flight else (), controller.put, controller.start_again
+        )
+        ticks: list[int] = []
+        error: SpaceRobotError | None = None
+        period = recording.timebase.period
+        count = min(float(recording.states_count), self._stop - self._start)
+        begin = time.perf_counter()
+        with flight_progress(count * period, f"replay, {choice.law_name}") as show:
+            try:
+                for state in self._states():
+                    laws.before(state.tick)
+                    ticks.append(state.tick)
+                    controller.answer(state)
+                    if len(ticks) % SHOW_TICKS == 0:
+                        show((state.tick - self._start) * period)
+            except (FlightError, LawError) as ended:
+                error = ended
+            show(count * period)
+        elapsed, played = time.perf_counter() - begin, np.array(ticks, np.int64)
+        if error and len(played) < 2:
             raise error
-        forces = *choice.names.thrusters, *recording.flight.get("prismatic_joints", ())
+        recorded = self._recorded
+        if error or not recording.is_finished:  # what came until then
+            recorded = recorded.within(self._start, int(played.max()) + 1)
         comparison = Comparison(
-            names,
+            choice.names.commanded,
             played,
-            self._recorded_until(played, error),
-            answers.commands(),
-            forces,
+            recorded,
+            controller.answers.commands(),
+            (*choice.names.thrusters, *recording.flight.get("prismatic_joints", ())),
             choice.names.torquers,
         )
         return Replay(
             options, choice, recording, comparison, self._laws, self._skipped, elapsed, error
         )
-
-    def _recorded_until(self, played: Ticks, error: FlightError | None) -> ReplayedCommands:
-        """Take of a replay, or a bag, that ended early only what came until then."""
-        if error is None and self._recording.is_finished:
-            return self._recorded
-        return self._recorded.within(self._start, int(played.max()) + 1)
-
-    def _play(self, player: Player, show: Callable[[int], None]) -> None:
-        states = self._states()
-        references = [self._recording.references(topic, self._start) for topic in REFERENCES]
-        laws = RecordedLaws(
-            self._laws if self._choice.follows_flight else (),
-            lambda law: set_parameters(
-                player.node, CONTROLLER, self._choice.law_parameters(law), player.check
-            ),
-            lambda: _start_again(player),
-        )
-        if self._options.rate is None:
-            player.lockstep(states, references, laws.before, show)
-        else:
-            period = self._recording.timebase.period / self._options.rate
-            player.by_the_clock(states, references, laws.before, show, period)
 
     def _states(self) -> Iterator[StateMessages]:
         """Return the states that the controller answered."""
@@ -214,59 +401,3 @@ class _Run:
                 yield state
             else:
                 self._skipped += 1
-
-    @contextmanager
-    def _show(self) -> Iterator[Callable[[int], None]]:
-        period = self._recording.timebase.period
-        count = min(float(self._recording.states_count), self._stop - self._start)
-        with flight_progress(count * period, f"replay, {self._choice.law_name}") as progress:
-
-            def show(tick: int) -> None:
-                now = time.monotonic()
-                if now > self._shown_at + SHOW_S:
-                    self._shown_at = now
-                    progress((tick - self._start) * period)
-
-            yield show
-            progress(count * period)
-
-
-def _bring_up(controller: NodeProcess, player: Player) -> None:
-    if refused := _change_state(player, "configure", "activate"):
-        raise FlightError(f"{CONTROLLER} refused to {refused}:\n{controller.output_tail()}")
-    player.wait_for_controller()
-
-
-def _start_again(player: Player) -> None:
-    """Reset the controller, as a restart in flight does."""
-    if refused := _change_state(player, "deactivate", "cleanup", "configure", "activate"):
-        raise FlightError(f"{CONTROLLER} refused to {refused}")
-    player.resend_pending()
-
-
-def _change_state(player: Player, *transitions: str) -> str:
-    """Request transitions of the controller; return the first refused one, or None."""
-    for transition in transitions:
-        if change_state(player.node, [CONTROLLER], transition, player.check):
-            return transition
-    return ""
-
-
-def _check(controller: NodeProcess, stopped: list[int]) -> None:
-    if stopped:
-        raise InterruptedFlightError("the replay was stopped", stopped[0])
-    if controller.exit_code is not None:
-        raise FlightError(
-            f"{controller.exit_summary()} before the replay was over:\n{controller.output_tail()}"
-        )
-
-
-@contextmanager
-def _frozen() -> Iterator[None]:
-    """Exclude existing objects from garbage collection during the replay."""
-    gc.collect()
-    gc.freeze()
-    try:
-        yield
-    finally:
-        gc.unfreeze()

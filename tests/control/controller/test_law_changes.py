@@ -13,8 +13,7 @@ import pytest
 from flights import forked_space_robot, space_robot_here, wait_for_nodes
 
 from space_robot.flight.graph.domain import ros_domain
-from space_robot.flight.replay.outcome import ReplayOptions
-from space_robot.flight.replay.run import replay
+from space_robot.flight.replay.run import ReplayOptions, replay
 from space_robot_msgs_py.bag.reader import read_flight
 
 pytest.importorskip("rclpy")
@@ -162,22 +161,22 @@ def test_a_dead_controller_leaves_the_plant_holding_then_without_torque(flown: F
     assert np.all(steps[0] <= 3.0 * steps[1:].max(axis=0))
 
 
-def test_it_replays_to_the_last_bit(flown: Flown, domain: int) -> None:
+def test_it_replays_to_the_last_bit(flown: Flown) -> None:
     """The replayed controller, too, begins again where the other did."""
     assert flown.log.commanded_torque is not None
     answered = np.flatnonzero(np.isfinite(flown.log.commanded_torque).all(axis=1))
     assert flown.log.laws[6].tick in answered, "the recorder has missed the first answer"
-    done = replay(ReplayOptions(flown.bag, domain=domain))
+    done = replay(ReplayOptions(flown.bag))
     assert done.is_judged
     assert done.comparison.is_identical, done.report()["first_difference"]
     np.testing.assert_array_equal(done.comparison.ticks, answered)
 
 
-def test_a_part_begins_under_the_law_in_force_there(flown: Flown, domain: int) -> None:
+def test_a_part_begins_under_the_law_in_force_there(flown: Flown) -> None:
     """CTC has no memory: it is equal again once it has taken over from the applied torque."""
     first, until = flown.log.laws[3].tick + 1, flown.log.laws[4].tick
     part = {"start_s": first * PERIOD, "end_s": until * PERIOD}
-    done = replay(ReplayOptions(flown.bag, domain=domain, **part))
+    done = replay(ReplayOptions(flown.bag, **part))
     assert done.comparison.ticks.tolist() == list(range(first, until))
     assert not done.comparison.equal[0]
     assert done.comparison.equal[45:].all(), "the transfer lasts 40 ticks, in flight and now"

@@ -77,6 +77,20 @@ def test_wheels_turn_their_momentum_with_the_base() -> None:
     np.testing.assert_allclose(load.momentum_share, [0.5])
 
 
+def test_couples_of_thrusters_about_one_axis_give_no_other_torque() -> None:
+    """Two of 5 N at 1 m, one after the other about +z and -z."""
+    couples = {
+        "positions": [1.0, 0.0, 0.0, -1.0, 0.0, 0.0] * 2,
+        "directions": [0.0, 1.0, 0.0, 0.0, -1.0, 0.0, 0.0, -1.0, 0.0, 0.0, 1.0, 0.0],
+        "force": [5.0],
+    }
+    still = np.zeros((3, 3))
+    torque = np.array([[0.0, 0.0, 5.0], [0.0, 0.0, -20.0], [0.1, 0.0, 0.0]])
+    load = actuator_load(hardware(thrusters=couples), torque, still, still)
+    np.testing.assert_allclose(load.torque_share[:2], [0.5, 2.0])
+    assert load.torque_share[2] > 1e3
+
+
 @settings(deadline=None)
 @given(SEEDS)
 def test_the_share_of_a_pyramid_is_its_fullest_wheels(seed: int) -> None:

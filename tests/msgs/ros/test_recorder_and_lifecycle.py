@@ -13,7 +13,7 @@ from bags import read_accounts
 from flights import Start
 from forked import Forked
 
-from space_robot.flight.graph.listeners import wait_for
+from space_robot.flight.graph.node_names import wait_for
 from space_robot_model.robot import Robot
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.bag.reader import read_flight

@@ -15,9 +15,8 @@ from numpy.typing import NDArray
 import space_robot as sr
 from space_robot import Scenario
 from space_robot.analysis.errors import controls_base
-from space_robot.flight.batch.batch import FlightBatch
+from space_robot.flight.batch.batch import FlightBatch, batch_key, batch_obstacle, batches
 from space_robot.flight.batch.benches import Benches
-from space_robot.flight.batch.sharing import batch_key, batches, reason_to_fly_alone
 from space_robot.flight.plan import Flight
 from space_robot.flight.simulate import simulate
 from space_robot_control.laws import laws
@@ -162,11 +161,11 @@ def test_what_only_changes_numbers_flies_together_and_message_faults_alone() -> 
     ]
     flights = [flight for change in changes for flight in some(1, sensors="fine", **change)]
     assert len({batch_key(flight) for flight in flights}) == 1
-    assert {reason_to_fly_alone(flight) for flight in flights} == {""}
+    assert {batch_obstacle(flight) for flight in flights} == {""}
     more = some(4, sensors="fine")
     assert [len(group) for group in batches(enumerate([*flights, *more]))] == [8, 2]
     (lossy,) = some(1, faults=["drop_state@0.01-0.02:0.5"])
-    assert reason_to_fly_alone(lossy) == "messages between plant and controller have faults"
+    assert batch_obstacle(lossy) == "messages between plant and controller have faults"
 
 
 @pytest.mark.parametrize(
@@ -187,7 +186,7 @@ def test_brief_logs_have_what_metrics_need(options: dict[str, Any]) -> None:
 
 
 def test_logs_too_large_for_memory_lie_in_a_file(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("space_robot.flight.batch.lane_log.MAPPED_FROM", 1000)
+    monkeypatch.setattr("space_robot.flight.flown_log.MAPPED_FROM", 1000)
     for flown, flight in zip(
         FlightBatch(some(2, sensors="fine")).fly(), some(2, sensors="fine"), strict=True
     ):

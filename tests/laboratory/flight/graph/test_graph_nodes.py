@@ -11,7 +11,7 @@ import pytest
 from flights import Start, forked_space_robot, ros_environment, simulated
 from forked import Forked
 
-from space_robot.flight.graph.listeners import wait_for
+from space_robot.flight.graph.node_names import wait_for
 from space_robot.processes.node_modules import MODULES
 from space_robot_model.robot import Robot
 from space_robot_model.robot.markers import RobotMarkers

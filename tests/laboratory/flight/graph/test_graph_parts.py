@@ -33,7 +33,7 @@ from rclpy.executors import SingleThreadedExecutor  # noqa: E402
 from std_srvs.srv import Trigger  # noqa: E402
 
 from space_robot.flight.graph import node_services  # noqa: E402
-from space_robot.flight.graph.temporary_node import TemporaryNode  # noqa: E402
+from space_robot.flight.graph.node_services import TemporaryNode  # noqa: E402
 
 TIMEOUT_S = 60.0
 PROGRAM = """

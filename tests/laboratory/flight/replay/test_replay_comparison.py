@@ -11,8 +11,7 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from space_robot.flight.replay.commands import CommandList, Form, ReplayedCommands
-from space_robot.flight.replay.comparison import Comparison
+from space_robot.flight.replay.comparison import CommandList, Comparison, ReplayedCommands
 from space_robot_msgs_py.samples import Command, Timebase
 from space_robot_msgs_py.wire.codecs import CommandCodec
 from space_robot_msgs_py.wire.definitions import decode, jazzy
@@ -139,9 +138,8 @@ def test_stretches_are_runs_of_ticks(
 
     def of(ticks: set[int], are_other: bool) -> ReplayedCommands:
         torque = np.array([[float(are_other and tick in other)] for tick in sorted(ticks)])
-        form = np.zeros(len(ticks), dtype=np.intp)
         numbers = np.array(sorted(ticks), dtype=np.int64)
-        return ReplayedCommands(numbers, torque.reshape(-1, 1), form, [Form("", "")], 0)
+        return ReplayedCommands(numbers, torque.reshape(-1, 1), {})
 
     compared = Comparison(("base_x",), np.arange(61), of(recorded, False), of(replayed, True))
     covered = [set(range(s.first, s.last + 1)) for s in compared.stretches]
