@@ -18,11 +18,9 @@ import yaml
 
 from space_robot.analysis.figures.style import save_figure
 from space_robot.campaign.flown import FlownCampaign
-from space_robot.campaign.report.console import tables
 from space_robot.campaign.report.figures import summary_figure
 from space_robot.campaign.report.findings import Findings
-from space_robot.campaign.report.league_tables import choice_tables
-from space_robot.campaign.report.subject import subject_of
+from space_robot.campaign.report.tables import choice_tables, league_tables, sections
 from space_robot.console.tables import Column, Group, Table, as_markdown
 
 HERE = Path(__file__).parent
@@ -40,7 +38,8 @@ def block(findings: Findings) -> str:
     """Return the tables that compare laws, and draw the campaign's figure."""
     comparing = [
         table
-        for table in tables(findings)
+        for section in sections(findings)
+        for table in section.tables
         if COMPARING & {column.name for column in table.columns}
         and not LEFT_OUT.search(table.title)
     ]
@@ -53,7 +52,7 @@ def figure(findings: Findings) -> str:
     drawn = summary_figure(findings)
     if drawn is None:
         return ""
-    name = f"law_{findings.subject.folder.name}"
+    name = f"law_{findings.folder.name}"
     save_figure(drawn, HERE / name)
     HERE.joinpath(f"{name}.svg").unlink()
     return f"![{name}]({name}.png)\n\n"
@@ -89,8 +88,8 @@ def own_name(text: str, nominal: str) -> str:
 def ranks(findings: Findings) -> str:
     """Return medians and ranks as one table, a metric a row; the campaign has no grid."""
     rows: dict[str, dict[str, str]] = {}
-    for table in tables(findings):
-        if "rank" in {c.name for c in table.columns} and "largest" not in table.title:
+    for table in league_tables(findings):
+        if "largest" not in table.title:
             of_laws = {row[0]: f"{row[2]} ({row[1]})" for row in table.groups[0].rows}
             rows[table.title] = of_laws
     laws = list(findings.names.values())
@@ -103,9 +102,8 @@ def renewed(found: re.Match[str]) -> str:
     """Return a block of the page with the tables of its folder; as it is if that is not there."""
     if not Path(found[2]).is_dir():
         return found[0]
-    findings = Findings(subject_of(FlownCampaign.open(found[2])))
-    subject = findings.subject
-    runs = f"{subject.table['run'].nunique()} runs, seed {subject.seed}.\n\n"
+    findings = Findings.of(FlownCampaign.open(found[2]))
+    runs = f"{findings.table['run'].nunique()} runs, seed {findings.seed}.\n\n"
     picture = figure(findings) if found[4] else ""
     of_kind = {" medians": medians, " by law": by_law, " ranks": ranks}.get(found[3], block)
     text = of_kind(findings)

@@ -12,7 +12,7 @@ from space_robot_msgs_py.errors import InputError
 from .analysed_log import AnalysedLog
 from .described import NO_LIMITS, torque_limits
 from .generalised_motion import measured_rows
-from .series import Definition, TimeSeries, metrics, series
+from .series import Definition, Limit, TimeSeries, metrics, series
 
 Array = NDArray[np.float64]
 
@@ -20,6 +20,8 @@ STANDING = 0.01
 """Share of the desired velocity below which a joint stands."""
 ROUNDING = 1e-9
 """rad or m of a position, share of other limits, by which a number at its limit may miss it."""
+LONG_STANDING = 0.05
+"""Least share of its way on which a joint stands that is worth a remark."""
 LEAST_WAY = 1e-3
 """Way, rad or m, from which on it is of interest whether a joint stands."""
 PERCENTILES = {"p50": 50.0, "p99": 99.0, "max": 100.0}
@@ -29,7 +31,9 @@ PERCENTILES = {"p50": 50.0, "p99": 99.0, "max": 100.0}
     "saturation",
     {
         "torque_limits.ticks": Definition("ticks", "ticks with a reported torque at its limit"),
-        "torque_limits.share": Definition("share", "share of these ticks"),
+        "torque_limits.share": Definition(
+            "share", "share of these ticks", limit=Limit("torques at their limit")
+        ),
         "torque_limits.base": Definition("N m", "limit of the base's torque; missing: none"),
         "torque_limits.joints": Definition("N m", "limit of the joints' torques; missing: none"),
     },
@@ -54,7 +58,11 @@ def saturation(flight: AnalysedLog) -> dict[str, float]:
 @metrics(
     "saturation",
     {
-        "wheels.saturation": Definition("share", "share of the ticks with any wheel at a limit"),
+        "wheels.saturation": Definition(
+            "share",
+            "share of the ticks with any wheel at a limit",
+            limit=Limit("wheels at their limit"),
+        ),
         "wheels.saturation_ticks": Definition("ticks", "these ticks"),
         "{wheel}.torque_limit_ticks": Definition("ticks", "ticks at the motor's largest torque"),
         "{wheel}.momentum_limit_ticks": Definition("ticks", "ticks at the largest momentum"),
@@ -113,7 +121,9 @@ def wheel_motion(
     "joints",
     {
         "{joint}.standing": Definition(
-            "share", "share of the way that the joint is to move on which friction holds it"
+            "share",
+            "share of the way that the joint is to move on which friction holds it",
+            limit=Limit("{} held by friction", LONG_STANDING),
         )
     },
 )

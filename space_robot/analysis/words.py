@@ -10,6 +10,7 @@ from space_robot_control.controller.law_choice import NoLaw
 from space_robot_msgs_py.bag.law_history import in_words
 
 from ..flight.start_step import sentence
+from .actuation import LONG_STANDING
 from .errors import FREE
 from .measure import column_unit
 
@@ -22,8 +23,6 @@ PURE_CYCLE, LARGE_CYCLE = 0.5, 0.1
 """Least RMS of a limit cycle as a share of the torque's ripple, and of the whole torque."""
 LASTING_CYCLE = 0.5
 """Least share of a flight's segments that have the ripple of a limit cycle; a burst has less."""
-LONG_STANDING = 0.05
-"""Least share of its way on which a joint stands that is worth a remark."""
 
 
 def flown(described: Mapping[str, Any]) -> str:

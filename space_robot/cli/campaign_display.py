@@ -11,11 +11,9 @@ from rich.console import Console
 
 from ..campaign.flown import FlownCampaign
 from ..campaign.report.findings import Findings
-from ..campaign.report.league_tables import number
-from ..campaign.report.subject import subject_of
-from ..campaign.report.verdict_tables import TONES, command
-from ..campaign.verdicts.quantiles import quantile
-from ..campaign.verdicts.values import ended, is_known, laws_of, measured, of_law
+from ..campaign.report.tables import TONES, number
+from ..campaign.verdicts.laws import quantile
+from ..campaign.verdicts.rows import has_values, is_complete, law_rows, laws_in, penalised
 from ..console.tables import Column, Table
 from ..console.tables import JudgedCell as Judged
 from ..console.terminal import say
@@ -40,7 +38,7 @@ def as_record(flown: FlownCampaign) -> dict[str, Any]:
         "runs_asked": flown.runs,
         "kept": flown.kept,
         "outcomes": {
-            law: of_law(table, law)["outcome"].value_counts().to_dict() for law in laws_of(table)
+            law: law_rows(table, law)["outcome"].value_counts().to_dict() for law in laws_in(table)
         },
         "verdicts": [asdict(verdict) for verdict in flown.verdicts],
     }
@@ -48,7 +46,7 @@ def as_record(flown: FlownCampaign) -> dict[str, Any]:
 
 def print_summary(flown: FlownCampaign, console: Console) -> None:
     """Print the number of completed flights, medians, verdicts, and next steps."""
-    findings = Findings(subject_of(flown))
+    findings = Findings.of(flown)
     names = findings.names
     print_table(medians(flown.table, names, flown.seed, list(flown.study.metrics)), console)
     if verdicts := findings.verdicts:
@@ -77,10 +75,11 @@ def print_summary(flown: FlownCampaign, console: Console) -> None:
         )
     say(console, shlex.join(["space-robot", "campaign", "report", str(flown.folder)]))
     # where no flight has a number all failed, and the first is as bad as any
-    driven = findings.driven
-    rows = findings.worst(findings.whole, driven[0], 1) if driven else flown.table
-    again = command(flown.folder, flown.study, int(rows["run"].iloc[0]), rows["law"].iloc[0])
-    say(console, f"{again}    # the worst")
+    judged = findings.judged
+    worst = (findings.worst(findings.whole, judged[0], 1) if judged else flown.table).iloc[0]
+    say(console, f"{findings.rerun_command(worst['run'], worst['law'])}    # the worst")
+    for limit in findings.limits:
+        say(console, limit)
 
 
 def medians(table: DataFrame, names: dict[str, str], seed: int, own: Sequence[str] = ()) -> Table:
@@ -92,13 +91,13 @@ def medians(table: DataFrame, names: dict[str, str], seed: int, own: Sequence[st
         seed: of the draws.
         own: names of the user's own metrics.
     """
-    shown = [name for name in (*SHOWN, *own) if is_known(table, f"metric.{name}")]
+    shown = [name for name in (*SHOWN, *own) if has_values(table, f"metric.{name}")]
     if SHOWN[0] in shown:
         shown.remove(SHOWN[1])
     rows = []
-    for law in laws_of(table):
-        own = of_law(table, law)
-        middle = (quantile(measured(own, f"metric.{name}"), 0.5).value for name in shown)
-        rows.append([names[law], f"{ended(own).sum()} of {len(own)}", *map(number, middle)])
+    for law in laws_in(table):
+        own = law_rows(table, law)
+        middle = (quantile(penalised(own, f"metric.{name}"), 0.5).value for name in shown)
+        rows.append([names[law], f"{is_complete(own).sum()} of {len(own)}", *map(number, middle)])
     columns = (Column("law", is_label=True), Column("complete"), *map(Column, shown))
     return Table.of(f"{table['run'].nunique()} runs, seed {seed}: medians", columns, rows)

@@ -12,7 +12,9 @@ from .options import file_option
 @click.command()
 @click.argument("folder", type=click.Path(path_type=Path), metavar="DIR")
 @file_option("--html", help="One page with all tables and figures, to send to a colleague.")
-@file_option("--markdown", help="The tables as Markdown, and beside it a figure, as PNG and SVG.")
+@file_option(
+    "--markdown", help="The tables as Markdown, and a figure of the same name as PNG and SVG."
+)
 @click.option(
     "--metric",
     "metrics",
@@ -36,7 +38,7 @@ def report(
     study: Path | None,
     as_json: bool,
 ) -> None:
-    """Report a campaign: requirements, laws, causes of error, worst runs.
+    """Report a campaign: limits met, requirements, laws, influences, worst runs.
 
     DIR is the folder of `campaign run`, finished or not. docs/manual/campaigns.md explains
     the numbers. Damaged files are listed.
@@ -50,7 +52,7 @@ def report(
     """
     from ..analysis.figures.style import save_figure
     from ..campaign.flown import FlownCampaign
-    from ..campaign.report import console, page, record, subject
+    from ..campaign.report import documents
     from ..campaign.report.figures import summary_figure
     from ..campaign.report.findings import Findings
     from ..campaign.study import read_study
@@ -60,21 +62,20 @@ def report(
     for path in (html, markdown):
         if path:
             check_free(path)
-    asked = None if study is None else read_study(study)
-    about = subject.subject_of(FlownCampaign.open(folder), asked)
-    for remark in about.remarks:
-        click.echo(remark, err=True)
-    findings = Findings(about, metrics)
+    judged_by = None if study is None else read_study(study)
+    findings = Findings.of(FlownCampaign.open(folder), judged_by, metrics)
+    for warning in findings.warnings:
+        click.echo(warning, err=True)
     if html:
-        write_text(page.render(findings), html)
+        write_text(documents.render(findings), html)
         click.echo(f"wrote {html}", err=True)
     if markdown:
         files = [markdown]
         if figure := summary_figure(findings):
             files += save_figure(figure, markdown.with_suffix(""))
-        write_text(console.markdown(findings), markdown)
+        write_text(documents.markdown(findings), markdown)
         click.echo(f"wrote {', '.join(map(str, files))}", err=True)
     if as_json:
-        echo_json(record.record(findings))
+        echo_json(documents.record(findings))
     else:
-        console.print_report(findings, terminal())
+        documents.print_report(findings, terminal())

@@ -9,10 +9,8 @@ from typing import TYPE_CHECKING, Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from .design import independent_rows
-from .share_test import MOST_RUNS, FixedSample, Sequential, ShareTest, first, log_evidence
-from .shares import Interval
-from .values import NOT_OF_THE_LAW, ended, laws_of, measured, of_law, parts, turned
+from .rows import EXTERNAL, grid_points, independent_rows, is_complete, law_rows, laws_in, penalised
+from .share_test import MOST_RUNS, FixedSample, Interval, Sequential, ShareTest, first, log_evidence
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -40,8 +38,8 @@ class Verdict:
     """Number of runs that miss the requirement, including those that ended early."""
     not_ended: int
     """Number of failures that ended early."""
-    not_of_the_law: int
-    """Number of these that were killed, out of time or refused."""
+    external: int
+    """Number of these that the law may not have caused: killed, out of time or refused."""
     not_measured: int
     """Number of completed runs without a value of the metric.
 
@@ -87,10 +85,10 @@ def verdicts(table: DataFrame, study: Study, runs: int, grid: Sequence[str] = ()
     if study.has_fixed_runs:
         test = FixedSample if len(table) >= runs * len(study.laws) else None
     return [
-        verdict(name, demand, of_law(part.table, law), test, law, part.point)
+        verdict(name, demand, law_rows(place.table, law), test, law, place.point)
         for name, demand in study.require.items()
-        for part in parts(rows, grid)
-        for law in laws_of(part.table)
+        for place in grid_points(rows, grid)
+        for law in laws_in(place.table)
     ]
 
 
@@ -113,9 +111,8 @@ def verdict(
         point: for the verdict.
     """
     sign, column = demand.sign, f"require.{name}"
-    badness = measured(turned(rows, column, sign), column)
-    has_ended = ended(rows)
-    is_unmeasured = has_ended & np.isinf(badness)
+    badness, complete = penalised(rows, column, sign), is_complete(rows)
+    is_unmeasured = complete & np.isinf(badness)
     runs, not_measured = len(badness), int(np.sum(is_unmeasured))
     failures = int(np.sum(~(badness < sign * demand.bound) & ~is_unmeasured))
     word: Word = "not measured" if not_measured else "undecided"
@@ -143,8 +140,8 @@ def verdict(
         word,
         runs,
         failures,
-        int(np.sum(~has_ended)),
-        int(rows["outcome"].isin(NOT_OF_THE_LAW).sum()),
+        int(np.sum(~complete)),
+        int(rows["outcome"].isin(EXTERNAL).sum()),
         not_measured,
         limits,
         bound,
@@ -156,10 +153,6 @@ def verdict(
 def family_error(study: Study, verdicts: list[Verdict]) -> float:
     """Return an upper bound of the probability that any verdict is false (Bonferroni)."""
     return min(1.0, sum(1.0 - study.require[v.requirement].confidence for v in verdicts))
-
-
-_STEPS = 32
-"""Size of the first searched interval of runs; it is doubled at each step."""
 
 
 class ProjectedDecision(NamedTuple):
@@ -200,7 +193,7 @@ def projected_decision(test: Sequential, failures: int, runs: int) -> ProjectedD
         return bool(log_evidence(events, n, share) >= level - 1e-6)
 
     start = first(may_be_decided, runs, MOST_RUNS + 1)
-    step, count = max(failures, failures * start // runs), _STEPS
+    step, count = max(failures, failures * start // runs), 32
     while step * runs // failures <= MOST_RUNS:
         steps = np.arange(step, step + count)
         # failures are constant between steps: the last run before a step is best for "met", the

@@ -1,4 +1,4 @@
-"""Tests of the share of cases that meet a requirement.
+"""Tests of the share of cases that meet a requirement, and confidence limits of that share.
 
 `FixedSample` is evaluated once, after a number of runs fixed in advance. `Sequential` may be
 evaluated after every run, so runs can be added until there is a verdict.
@@ -7,16 +7,15 @@ evaluated after every run, so runs can be added until there is a verdict.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from bisect import bisect_left
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import betainc, betaln, xlog1py, xlogy
-from scipy.stats import binom
-
-from .shares import Interval, share_limits
+from scipy.stats import beta, binom, binomtest
 
 Array = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -25,7 +24,27 @@ Numbers = float | NDArray[Any]
 
 MOST_RUNS = 10**9
 """Largest number of runs considered."""
-_HALVINGS = 60
+HALVINGS = 60
+
+
+class Interval(NamedTuple):
+    """A confidence interval."""
+
+    low: float
+    high: float
+
+    @property
+    def half_width(self) -> float:
+        """Half the width of the interval."""
+        return 0.5 * (self.high - self.low)
+
+
+def share_interval(successes: int, runs: int, confidence: float) -> Interval:
+    """Return the two-sided interval of a share by Clopper and Pearson (1934); 0 to 1 of no runs."""
+    if runs == 0:
+        return Interval(0.0, 1.0)
+    interval = binomtest(successes, runs).proportion_ci(confidence, method="exact")
+    return Interval(float(interval.low), float(interval.high))
 
 
 @dataclass(frozen=True)
@@ -41,20 +60,29 @@ class ShareTest(ABC):
     """Confidence of each test, 0 to 1."""
 
     @abstractmethod
+    def is_below(self, events: Numbers, runs: Numbers, share: float) -> Bools:
+        """Return True where so few ``events`` prove that their share of the cases is smaller."""
+
+    @abstractmethod
+    def upper_limit(self, events: int, runs: int) -> float:
+        """Return the one-sided confidence limit of the share of events."""
+
     def is_met(self, failures: Numbers, runs: Numbers) -> Bools:
         """Return True where the number of failures proves the requirement met."""
+        return self.is_below(failures, runs, 1.0 - self.share)
 
-    @abstractmethod
     def is_missed(self, failures: Numbers, runs: Numbers) -> Bools:
         """Return True where the number of failures proves the requirement not met."""
+        return self.is_below(runs - failures, runs, self.share)
 
-    @abstractmethod
     def limits(self, failures: int, runs: int) -> Interval:
         """Return one-sided confidence limits of the share of cases that meet the requirement.
 
         The lower limit is at least `share` if and only if `is_met`, the upper one at most `share`
         if and only if `is_missed`.
         """
+        low = 1.0 - self.upper_limit(failures, runs)
+        return Interval(low, self.upper_limit(runs - failures, runs))
 
     def allowed_failures(self, runs: int) -> int:
         """Return the largest number of failures that is still "met"; -1 if there is none."""
@@ -84,21 +112,14 @@ class FixedSample(ShareTest):
     As in Hanson and Beard, Applying Monte Carlo Simulation to Launch Vehicle Design and
     Requirements Analysis, NASA/TP-2010-216447: the requirement is met if, for a true share equal to
     the required one, so few failures have a probability (consumer's risk) of at most
-    ``1 - confidence``.
+    ``1 - confidence``. Limits are those of Clopper and Pearson (1934).
     """
 
-    def is_met(self, failures: Numbers, runs: Numbers) -> Bools:
-        """Return True where the requirement is met."""
-        return np.asarray(binom.cdf(failures, runs, 1.0 - self.share) <= 1.0 - self.confidence)
+    def is_below(self, events: Numbers, runs: Numbers, share: float) -> Bools:  # noqa: D102
+        return np.asarray(binom.cdf(events, runs, share) <= 1.0 - self.confidence)
 
-    def is_missed(self, failures: Numbers, runs: Numbers) -> Bools:
-        """Return True where the requirement is missed."""
-        tail = binom.sf(failures - 1, runs, 1.0 - self.share)
-        return np.asarray(tail <= 1.0 - self.confidence)
-
-    def limits(self, failures: int, runs: int) -> Interval:
-        """Return the one-sided limits of Clopper and Pearson (1934)."""
-        return share_limits(runs - failures, runs, self.confidence)
+    def upper_limit(self, events: int, runs: int) -> float:  # noqa: D102
+        return float(beta.ppf(self.confidence, events + 1, runs - events)) if events < runs else 1.0
 
 
 class Sequential(ShareTest):
@@ -108,44 +129,28 @@ class Sequential(ShareTest):
     ``1 / (1 - confidence)`` with a probability of at most ``1 - confidence``.
     """
 
-    @property
-    def _threshold(self) -> float:
-        return -float(np.log1p(-self.confidence))
+    def is_below(self, events: Numbers, runs: Numbers, share: float) -> Bools:  # noqa: D102
+        threshold = -np.log1p(-self.confidence)
+        return np.asarray(log_evidence(events, runs, share) >= threshold)
 
-    def is_met(self, failures: Numbers, runs: Numbers) -> Bools:
-        """Return True where the requirement is met."""
-        evidence = log_evidence(failures, runs, 1.0 - self.share)
-        return np.asarray(evidence >= self._threshold)
-
-    def is_missed(self, failures: Numbers, runs: Numbers) -> Bools:
-        """Return True where the requirement is missed."""
-        evidence = log_evidence(runs - failures, runs, self.share)
-        return np.asarray(evidence >= self._threshold)
-
-    def limits(self, failures: int, runs: int) -> Interval:
-        """Return one-sided limits of the share, valid at every number of runs."""
-        low = 1.0 - self._upper_limit(failures, runs)
-        return Interval(low, self._upper_limit(runs - failures, runs))
-
-    def interval(self, failures: int, runs: int) -> Interval:
-        """Return the two-sided interval of the share of cases that meet the requirement.
-
-        The interval has the confidence `confidence` for all numbers of runs together.
-        """
-        return Sequential(self.share, 0.5 + 0.5 * self.confidence).limits(failures, runs)
-
-    def _upper_limit(self, events: int, runs: int) -> float:
-        """Return the largest share of events with an evidence not above the threshold."""
+    def upper_limit(self, events: int, runs: int) -> float:  # noqa: D102
         low, high = (events / runs, 1.0) if runs else (1.0, 1.0)
-        for _ in range(_HALVINGS):
+        for _ in range(HALVINGS):
             middle = 0.5 * (low + high)
             if not low < middle < high:
                 break
-            if log_evidence(events, runs, middle) >= self._threshold:
+            if self.is_below(events, runs, middle):
                 high = middle
             else:
                 low = middle
         return high
+
+    def interval(self, failures: int, runs: int) -> Interval:
+        """Return the two-sided interval of the share of cases that meet the requirement.
+
+        The interval has the confidence `confidence` for all numbers of runs jointly.
+        """
+        return Sequential(self.share, 0.5 + 0.5 * self.confidence).limits(failures, runs)
 
 
 def log_evidence(events: Numbers, runs: Numbers, share: float) -> Array:
@@ -175,14 +180,4 @@ def first(holds: Callable[[int], bool], low: int, high: int) -> int:
 
     ``holds`` must be monotone: if it is true for a number, then also for all larger ones.
     """
-    step, below = 1, low - 1
-    while below + step < high and not holds(below + step):
-        below, step = below + step, 2 * step
-    above = min(below + step, high)
-    while above - below > 1:
-        middle = (below + above) // 2
-        if holds(middle):
-            above = middle
-        else:
-            below = middle
-    return above
+    return low + bisect_left(range(low, high), True, key=lambda n: bool(holds(n)))

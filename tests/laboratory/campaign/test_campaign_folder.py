@@ -16,7 +16,6 @@ import yaml
 
 from space_robot.campaign.flown import Campaign, FlownCampaign
 from space_robot.campaign.report.findings import Findings
-from space_robot.campaign.report.subject import subject_of
 from space_robot.campaign.row.row import Row, Task
 from space_robot.campaign.store.folder import begin_or_resume, held_folder
 from space_robot.campaign.store.journal import Journal
@@ -26,7 +25,6 @@ from space_robot.campaign.store.manifest import Manifest, read_manifest
 from space_robot.campaign.store.schema import Schema
 from space_robot.campaign.store.software import file_digests, source_digest
 from space_robot.campaign.study import Study
-from space_robot.campaign.verdicts.requirements import verdicts
 from space_robot_control.laws.names import NotTrustedError
 from space_robot_msgs_py.errors import InputError
 
@@ -47,10 +45,9 @@ CAMPAIGN = Campaign.of(CONTENT)
 
 def numbers(folder: Path, study: Study | None = None) -> tuple[str, list[str]]:
     """All that a report is made of, and its remarks on the folder."""
-    subject = subject_of(FlownCampaign.open(folder), study)
-    judged = verdicts(subject.table, subject.study, subject.runs)
-    text = f"{subject.table.to_dict('list')} {judged} {subject.seed} {subject.runs} {subject.about}"
-    return text, list(subject.remarks)
+    found = Findings.of(FlownCampaign.open(folder), study)
+    text = f"{found.table.to_dict('list')} {found.verdicts} {found.seed} {found.runs} {found.about}"
+    return text, list(found.warnings)
 
 
 def run(folder: Path, warn: Callable[[str], object] = warnings.warn) -> FlownCampaign:
@@ -93,13 +90,13 @@ def test_another_study_judges_the_same_rows(whole: Path, reported: str) -> None:
         "by_rms": {"metric": "attitude.rms", "below": 1.0, "in": 0.5},
         "late_again": {**CONTENT["require"]["late"], "below": 1e-30},
     }
-    subject = subject_of(FlownCampaign.open(whole), asked(require=require, runs=9))
-    assert subject.table["require.by_rms"].equals(table["metric.attitude.rms"])
-    assert subject.table["require.late_again"].equals(table["require.late"])
-    assert "require.pointing" not in subject.table
-    failures = {v.requirement: v.failures for v in Findings(subject).verdicts}
+    found = Findings.of(FlownCampaign.open(whole), asked(require=require, runs=9))
+    assert found.table["require.by_rms"].equals(table["metric.attitude.rms"])
+    assert found.table["require.late_again"].equals(table["require.late"])
+    assert "require.pointing" not in found.table
+    failures = {v.requirement: v.failures for v in found.verdicts}
     assert failures == {"by_rms": 0, "late_again": 2}
-    assert subject.remarks == ["The requirements are those of other.yaml."]
+    assert found.warnings == ["The requirements are those of other.yaml."]
     assert numbers(whole)[0] == reported
     for other, said in (
         ({"laws": ["ctc"]}, "other.yaml: laws: .* was flown"),
@@ -110,7 +107,7 @@ def test_another_study_judges_the_same_rows(whole: Path, reported: str) -> None:
         ),
     ):
         with pytest.raises(InputError, match=said):
-            subject_of(FlownCampaign.open(whole), asked(**other))
+            Findings.of(FlownCampaign.open(whole), asked(**other))
 
 
 LAW = """

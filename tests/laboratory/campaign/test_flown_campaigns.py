@@ -17,7 +17,6 @@ from space_robot.campaign.flown import Campaign, FlownCampaign, campaign, flight
 from space_robot.campaign.flown.flights import Progress
 from space_robot.campaign.flown.precision import CHECKED_EVERY, Precision
 from space_robot.campaign.report.findings import Findings
-from space_robot.campaign.report.subject import subject_of
 from space_robot.campaign.row.row import Row, Task
 from space_robot.campaign.study import Study
 from space_robot.campaign.verdicts.share_test import Sequential
@@ -142,7 +141,7 @@ def test_it_stops_at_a_precision_whoever_flies_it(
     one = asked.run(out=tmp_path / "one", workers=0)
     asked.run(out=tmp_path / "two", workers=2)
     assert one.table["vary.scenario.case"].value_counts().tolist() == [5, 5]
-    remarks = Findings(subject_of(one)).remarks
+    remarks = Findings.of(one).remarks
     assert not any("not finished" in remark for remark in remarks)
     assert table_of(tmp_path / "one") == table_of(tmp_path / "two")
 

@@ -10,7 +10,6 @@ import pytest
 
 from space_robot import Campaign, FlownCampaign
 from space_robot.campaign.report.findings import Findings
-from space_robot.campaign.report.subject import subject_of
 from space_robot.campaign.row import fly
 from space_robot_control.laws.names import NotTrustedError
 from space_robot_msgs_py.bag.flight_log import FlightLog
@@ -96,7 +95,7 @@ def test_it_is_a_column_with_the_same_bits_however_it_is_flown(
 def test_verdicts_and_reports_have_it() -> None:
     flown = campaign().run(5, 7, "one", workers=0)
     assert {verdict.requirement for verdict in flown.verdicts} == {"small", "late", "pointing"}
-    names = [quantity.name for quantity in Findings(subject_of(flown)).metrics]
+    names = [quantity.name for quantity in Findings.of(flown).metrics]
     assert "overshoot" in names
     assert read_yaml(Path("one/campaign.yaml"))["metrics"] == CONTENT["metrics"]
     assert not flown.study_changes
@@ -106,7 +105,7 @@ def test_verdicts_and_reports_have_it() -> None:
         campaign().run(8, 7, "one", workers=0)
     other = campaign(metrics={"overshoot": "mine.py:nan"}).study
     with pytest.raises(InputError, match=r"metrics\.overshoot: 'mine\.py:overshoot' was flown"):
-        subject_of(flown, other)
+        Findings.of(flown, other)
 
 
 def test_code_of_someone_elses_folder_is_not_run() -> None:

@@ -20,12 +20,9 @@ from scipy.stats import (
 )
 from scipy.stats import sobol_indices as scipy_sobol
 
-from space_robot.campaign.verdicts.design import independent_rows, saltelli_values
-from space_robot.campaign.verdicts.league import league
-from space_robot.campaign.verdicts.paired import compare, compare_all, holm
-from space_robot.campaign.verdicts.quantiles import quantile
-from space_robot.campaign.verdicts.sensitivity import sensitivity
-from space_robot.campaign.verdicts.sobol import indices, sobol_indices
+from space_robot.campaign.verdicts.influences import indices, sensitivity, sobol_indices
+from space_robot.campaign.verdicts.laws import compare, compare_all, holm, league, quantile
+from space_robot.campaign.verdicts.rows import independent_rows, saltelli_values
 
 numbers = st.one_of(st.floats(1e-6, 1e3), st.just(np.inf))
 
@@ -81,7 +78,7 @@ def test_the_league_ranks_what_is_shown() -> None:
     assert first.ratio.low < 1 / 1.5 < first.ratio.high
 
 
-def test_laws_that_are_not_told_apart_share_a_rank() -> None:
+def test_laws_without_a_shown_difference_share_a_rank() -> None:
     table = made_table(30, laws=("a", "b"), failing=0.0)
     table["metric.attitude.rms"] = np.random.default_rng(0).uniform(size=len(table))
     assert [s.rank for s in league(table, "metric.attitude.rms").standings] == [1, 1]
@@ -165,7 +162,7 @@ def test_partial_correlations_are_those_of_residuals_for_every_variable() -> Non
     assert found.explained == pytest.approx(1.0 - (1.0 - r_squared) * (runs - 1) / (runs - 4))
 
 
-def test_words_are_told_by_groups() -> None:
+def test_texts_are_compared_by_groups() -> None:
     rng = np.random.default_rng(4)
     kind = rng.choice(["a", "b", "c"], 90)
     metric = rng.normal(size=90) + 2.0 * (kind == "b")

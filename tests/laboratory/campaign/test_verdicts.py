@@ -25,8 +25,8 @@ from space_robot.campaign.verdicts.share_test import (
     Sequential,
     ShareTest,
     log_evidence,
+    share_interval,
 )
-from space_robot.campaign.verdicts.shares import share_interval, share_limits
 
 
 @given(
@@ -39,7 +39,7 @@ def test_both_ends_are_quantiles_of_beta(pair: tuple[int, int], confidence: floa
     low = beta.ppf(tail, k, n - k + 1) if k else 0.0
     high = beta.ppf(1.0 - tail, k + 1, n - k) if k < n else 1.0
     assert share_interval(k, n, confidence) == pytest.approx((low, high), rel=1e-6, abs=1e-12)
-    limits = share_limits(k, n, 1.0 - tail)
+    limits = FixedSample(0.9, 1.0 - tail).limits(n - k, n)
     assert limits == pytest.approx((low, high), rel=1e-6, abs=1e-12)
     assert share_interval(0, 0, 0.9) == (0.0, 1.0)
 
@@ -224,7 +224,7 @@ def test_what_is_not_measured_speaks_against_every_verdict() -> None:
 def test_a_flight_that_did_not_end_is_a_failure_whatever_its_number(outcome: str) -> None:
     found = judge(demand_of(1.0), rows([0.5] * 9, failed=1, outcome=outcome))
     assert (found.failures, found.not_ended) == (1, 1)
-    assert found.not_of_the_law == (outcome in ("killed", "out_of_time", "refused"))
+    assert found.external == (outcome in ("killed", "out_of_time", "refused"))
     above = judge(demand_of(above=-1.0), rows([0.5] * 9, failed=1, outcome=outcome))
     assert above.failures == 1
 

@@ -1,0 +1,475 @@
+"""The tables of a report, the same on a terminal, in Markdown and on a page."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any, NamedTuple
+
+from ...console.tables import Column, Group, JudgedCell, Table
+from ..verdicts.laws import Estimate, League
+from ..verdicts.requirements import Verdict
+from ..verdicts.rows import GridPoint
+from .findings import CONFIDENCE, WORST, Findings, Quantity
+
+TONES = {
+    **{"met": "good", "not met": "bad", "undecided": "open", "not measured": "open"},
+    **{"better": "good", "worse": "bad", "alike": "open", "contradictory": "open"},
+}
+NO_DIFFERENCE = "no difference shown"
+STRONGEST = 5
+"""Variables in a table of influences."""
+MOST_NAMED = 8
+"""Laws and grid points that are named in one cell; more are counted."""
+SEQUENTIAL = (
+    "By a confidence sequence (Robbins 1970; Howard and others 2021): met, if the share of cases "
+    "that meet the requirement is above the demanded one with its confidence, at any number of "
+    "runs; not met, if it is below; else undecided."
+)
+FIXED = (
+    "By order statistics (Hanson and Beard, NASA/TP-2010-216447): met, if so few runs would miss "
+    "the requirement only with the probability that the confidence leaves over, were the share any "
+    "smaller; not met, if the same holds of so many; else undecided."
+)
+COUNTED = (
+    "No distribution is assumed. An incomplete flight misses every requirement; one without the "
+    "required number is not measured, and counts against every verdict."
+)
+BOUNDS = (
+    "At least, at most: limits of the share of cases that meet the requirement, each at its "
+    "confidence. Bound: with that confidence the metric is no worse in the demanded share of the "
+    "cases (failed: too many flights failed; a dash: too few runs)."
+)
+FIXED_RUNS = "The number of runs was fixed before the first flight: one test, no runs added."
+MORE_RUNS = (
+    "More runs: until it is met if none of them fails; until it is decided, and how, if failures "
+    "go on at their rate. Verdicts and limits hold at any number of runs, so runs may be added "
+    "until a verdict is reached."
+)
+RANKS = (
+    f"A law ranks below another only where the comparison over the same draws shows it with "
+    f"{CONFIDENCE:.0%} confidence (sign test and interval of the median ratio, or failures; "
+    "corrected over all pairs of a metric after Holm). Quantiles count a failed flight as worse "
+    f"than any number; intervals are of {CONFIDENCE:.0%}, each by itself."
+)
+BEST = (
+    "Medians; in brackets the flights that failed, in %. To fly: the laws than which none is "
+    f"shown to be better, with {CONFIDENCE:.0%} confidence at each point."
+)
+PAIRS = (
+    "Better in: runs in which the law's number is smaller than the other's in the same draw. p: of "
+    "the exact sign test, and of the same test over the runs in which just one of the two failed; "
+    "both corrected after Holm."
+)
+INFLUENCE = (
+    "Rank correlation (Spearman): positive if more of the variable makes it worse; with the other "
+    "numbers held fixed (partial) where there are enough runs. Spread: the share of the spread of "
+    "ranks that the variable explains by itself, whatever the shape (Kruskal and Wallis); p of no "
+    f"influence at all, corrected after Holm. Intervals are of {CONFIDENCE:.0%}. Failed flights "
+    "rank worst."
+)
+SOBOL = (
+    "Shares of the metric's variance: what a variable brings by itself (first), and including its "
+    f"interactions with others (total); bootstrap intervals of {CONFIDENCE:.0%}."
+)
+
+
+class Section(NamedTuple):
+    """A part of a report."""
+
+    key: str
+    """``laws``: also of its figures."""
+    title: str
+    intro: str = ""
+    """For the readers of a page."""
+    tables: Sequence[Table] = ()
+    details: Sequence[Table] = ()
+    """Tables of the page only, folded."""
+
+
+def sections(findings: Findings) -> list[Section]:
+    """Return the parts of a report; figures of a page may add to those without tables."""
+    has_grid, required = bool(findings.grid), findings.required
+    test = FIXED if findings.study.has_fixed_runs else SEQUENTIAL
+    in_full = [verdict_table(findings, quantity) for quantity in required]
+    if has_grid:
+        by_point = [verdict_grid(findings, quantity) for quantity in required]
+        laws = _noted(choice_tables(findings), [BEST])
+        pairs = _noted(pair_tables(findings), [PAIRS, RANKS])
+    else:
+        by_point, laws = [], _noted(league_tables(findings), [RANKS])
+        pairs = _noted(pair_tables(findings), [PAIRS])
+    return [
+        Section("findings", "Findings", "", _noted([summary_table(findings)], [])),
+        Section("flown", "What was flown", "", [flown_table(findings), outcome_table(findings)]),
+        Section(
+            "requirements",
+            "Requirements",
+            f"{test} {COUNTED}" if required else "",
+            _noted(by_point or in_full, _verdict_notes(findings)),
+            in_full if by_point else (),
+        ),
+        Section("laws", "Laws", "", laws, pairs),
+        Section(
+            "bands",
+            "Over time",
+            "The largest norm in each of the bins of time, over all runs. From its end on a flight "
+            "that failed counts as worse than any number: where more than 5 % have failed the band "
+            "has no upper edge.",
+        ),
+        Section(
+            "distributions",
+            "Distributions",
+            "A curve that ends below 1 leaves out the flights that failed. Dotted: a requirement's "
+            "limit and share.",
+        ),
+        Section(
+            "influences",
+            "Influence of the variables",
+            "",
+            [
+                *_noted(influence_tables(findings), [INFLUENCE]),
+                *_noted(sobol_tables(findings), [SOBOL]),
+            ],
+        ),
+        Section(
+            "worst",
+            "Worst runs",
+            "Each command flies a row again, with the same bits, and records a whole bag.",
+            [worst_table(findings, findings.whole, quantity) for quantity in findings.judged],
+            [
+                worst_table(findings, point, quantity, law)
+                for quantity in findings.judged
+                for point in findings.points
+                for law in ([""] if has_grid else findings.laws)
+                if has_grid or len(findings.laws) > 1
+            ],
+        ),
+    ]
+
+
+def _noted(tables: Sequence[Table], notes: Sequence[str]) -> list[Table]:
+    """Return the tables that have rows, with notes below the last of them."""
+    tables = [table for table in tables if table.groups[0].rows]
+    return [*tables[:-1], *(replace(table, notes=notes) for table in tables[-1:])]
+
+
+def _columns(labels: Sequence[str], numbers: Sequence[str] = ()) -> list[Column]:
+    return [*(Column(name, is_label=True) for name in labels), *map(Column, numbers)]
+
+
+def number(value: float, spec: str = ".3g") -> str:
+    """Format a number; infinity stands for failed flights."""
+    return "failed" if math.isinf(value) else "-" if math.isnan(value) else format(value, spec)
+
+
+def span(estimate: Estimate, spec: str = ".3g") -> str:
+    """Format an interval; an infinite end is a question mark."""
+    low, high = (format(x, spec) if math.isfinite(x) else "?" for x in estimate[1:])
+    return f"{low} to {high}"
+
+
+def _titled(*parts: str) -> str:
+    return ", ".join(part for part in parts if part)
+
+
+def summary_table(findings: Findings) -> Table:
+    """Tabulate limits that most flights met, verdicts by requirement, and remarks."""
+    rows: list[list[Any]] = [["limit", JudgedCell("", text, "bad")] for text in findings.limits]
+    for quantity in findings.required:
+        for word in ("met", "not met", "undecided", "not measured"):
+            named = [
+                f"{findings.names[v.law]} ({v.point})" if v.point else findings.names[v.law]
+                for v in findings.verdicts
+                if (v.requirement, v.word) == (quantity.name, word)
+            ]
+            if named:
+                under = ", ".join(named) if len(named) <= MOST_NAMED else f"{len(named)} cases"
+                rows.append([quantity.name, JudgedCell(f"{under}:", word, TONES[word])])
+    rows += [["remark", text] for text in findings.remarks]
+    return Table.of("Findings", _columns(["", ""]), rows)
+
+
+def flown_table(findings: Findings) -> Table:
+    """Tabulate file, seed, runs, laws, variables and software versions of the campaign."""
+    study = findings.study
+    scenario = ", ".join(f"{key}: {_short(value)}" for key, value in study.scenario.items())
+    rows = [
+        ["campaign", str(findings.folder)],
+        ["scenario", scenario or "all as by default"],
+        ["laws", ", ".join(study.laws)],
+        ["seed", str(findings.seed)],
+        ["runs", f"{findings.table['run'].nunique()} of {findings.runs} under every law"],
+        ["design", study.design],
+        *([f"varied: {name}", _short(value)] for name, value in study.vary.items()),
+        *([name, text] for name, text in findings.about.items()),
+    ]
+    return Table.of("What was flown", _columns(["", ""]), rows)
+
+
+def _short(value: object) -> str:
+    """Return a value of the file as one line."""
+    text = value if isinstance(value, str) else json.dumps(value, default=str).replace('"', "")
+    return text if len(text) <= 160 else text[:157] + "..."
+
+
+def outcome_table(findings: Findings) -> Table:
+    """Tabulate how the flights of each law ended."""
+    import pandas
+
+    counts = pandas.crosstab(findings.table["law"], findings.table["outcome"]).loc[findings.laws]
+    outcomes = sorted(map(str, counts), key=lambda outcome: (outcome != "complete", outcome))
+    rows = [
+        [findings.names[law], *map(str, row)]
+        for law, *row in counts[outcomes].itertuples(name=None)
+    ]
+    return Table.of("How the flights ended", _columns(["law"], outcomes), rows)
+
+
+def demand_text(quantity: Quantity) -> str:
+    """Return the text of a requirement."""
+    demand = quantity.requirement
+    assert demand is not None
+    way = "below" if demand.above is None else "above"
+    angle = ""
+    if demand.metric in ("attitude.rms", "attitude.max") and 0.0 <= demand.bound <= 1.0:
+        angle = f" (an angle of {math.degrees(2.0 * math.asin(demand.bound)):.3g} deg)"
+    return (
+        f"{quantity.heading} {way} {demand.bound:g} {quantity.unit}".rstrip()
+        + angle
+        + f" in {100.0 * demand.share:g} % of the cases, "
+        f"shown with {100.0 * demand.confidence:g} % confidence"
+    )
+
+
+def verdict_table(findings: Findings, quantity: Quantity) -> Table:
+    """Tabulate the verdicts on a requirement, a row for each grid point and law."""
+    numbers = ["missed in", "at least", "at most", "bound"]
+    if not findings.study.has_fixed_runs:
+        numbers.append("more runs")
+    columns = _columns([*_grid_names(findings), "law", "verdict"], numbers)
+    values = {point.point: point.values for point in findings.points}
+    rows = [
+        [*values[v.point], *_verdict_row(v, findings.names[v.law])][: len(columns)]
+        for v in findings.verdicts
+        if v.requirement == quantity.name
+    ]
+    return Table.of(f"{quantity.name}: {demand_text(quantity)}", columns, rows)
+
+
+def _verdict_row(v: Verdict, name: str) -> list[str | JudgedCell]:
+    missed, more = f"{v.failures} of {v.runs}", "-"
+    if v.word == "undecided":
+        without = "many" if v.needed_without_failure is None else str(v.needed_without_failure)
+        decision = "undecided"
+        if v.projected_decision is not None:
+            runs, met = v.projected_decision
+            decision = f"{runs - v.runs}: {'met' if met else 'not met'}"
+        more = f"{without}; {decision}"
+    return [
+        name,
+        JudgedCell("", v.word, TONES[v.word]),
+        f"{missed}, {v.not_measured} not measured" if v.not_measured else missed,
+        f"{100.0 * v.limits.low:.4g} %",
+        f"{100.0 * v.limits.high:.4g} %",
+        "-" if v.bound is None else number(v.bound),
+        more,
+    ]
+
+
+def verdict_grid(findings: Findings, quantity: Quantity) -> Table:
+    """Tabulate a requirement's verdicts over a grid: points as rows, laws as columns."""
+    cells = {
+        (v.point, v.law): JudgedCell(
+            "" if v.not_measured else f"{v.failures}", v.word, TONES[v.word]
+        )
+        for v in findings.verdicts
+        if v.requirement == quantity.name
+    }
+    rows = [
+        [*point.values, *(cells.get((point.point, law)) for law in findings.laws)]
+        for point in findings.points
+    ]
+    columns = _columns(_grid_names(findings), list(findings.names.values()))
+    return Table.of(f"{quantity.name}: {demand_text(quantity)}", columns, rows)
+
+
+def _grid_names(findings: Findings) -> list[str]:
+    return [name.removeprefix("scenario.") for name in findings.grid]
+
+
+def _verdict_notes(findings: Findings) -> list[str]:
+    """Return the explanation of the columns, and the probability of any false verdict."""
+    if not findings.required:
+        return []
+    columns = f"{BOUNDS} {FIXED_RUNS if findings.study.has_fixed_runs else MORE_RUNS}"
+    if findings.grid:
+        columns = "Runs that miss it, and the verdict."
+    count = len(findings.verdicts)
+    each = max(1.0 - q.requirement.confidence for q in findings.required if q.requirement)
+    one = f"A verdict is false with a probability of at most {each:.2g}"
+    if count == 1:
+        return [columns, f"{one}."]
+    return [
+        columns,
+        f"{one}, and any of these {count} with at most {findings.family_error:.2g}: for "
+        f"{each:.2g} in all, ask each for a confidence of {1.0 - each / count:.4g}.",
+    ]
+
+
+def league_tables(findings: Findings) -> list[Table]:
+    """Tabulate the leagues of a campaign without grid, one table per metric."""
+    columns = _columns(["law"], ["rank", "median", "interval", "99 %", "failed"])
+    return [
+        Table.of(
+            metric.label,
+            columns,
+            [
+                [
+                    findings.names[s.law],
+                    str(s.rank),
+                    number(s.median.value),
+                    span(s.median),
+                    number(s.tail.value),
+                    f"{s.failures} of {s.runs}",
+                ]
+                for s in league.standings
+            ],
+        )
+        for _, metric, league in findings.leagues
+    ]
+
+
+def pair_tables(findings: Findings) -> list[Table]:
+    """Tabulate every pair of laws at each grid point, one table per metric."""
+    numbers = ["better in", "median ratio", "interval", "p", "only it fails", "p of failures"]
+    columns = _columns([*_grid_names(findings), "law", "compared with", "is"], numbers)
+    words = {"alike": NO_DIFFERENCE, "contradictory": "contradictory: failures and numbers"}
+    return [
+        Table.of(
+            f"Pairs of laws, {metric.label}",
+            columns,
+            [
+                [
+                    *point.values,
+                    findings.names[c.law],
+                    findings.names[c.other],
+                    JudgedCell("", words.get(c.finding, c.finding), TONES[c.finding]),
+                    f"{c.better} of {c.runs}",
+                    number(c.ratio.value),
+                    span(c.ratio),
+                    f"{c.p_better:.2g}",
+                    f"{c.failed}, other {c.other_failed}",
+                    f"{c.p_failed:.2g}",
+                ]
+                for point, other, league in findings.leagues
+                if other is metric
+                for c in league.comparisons
+            ],
+        )
+        for metric in findings.metrics
+    ]
+
+
+def choice_tables(findings: Findings) -> list[Table]:
+    """Tabulate medians and the best laws at each point of the grid, one table per metric."""
+    columns = _columns(_grid_names(findings), list(findings.names.values()))
+    columns.append(Column("to fly", is_label=True))
+    return [
+        Table.of(
+            metric.label,
+            columns,
+            [
+                [
+                    *point.values,
+                    *_medians(findings, league),
+                    JudgedCell("", _best(findings, league), "good"),
+                ]
+                for point, other, league in findings.leagues
+                if other is metric
+            ],
+        )
+        for metric in findings.metrics
+    ]
+
+
+def _medians(findings: Findings, league: League) -> list[str]:
+    texts = dict.fromkeys(findings.laws, "-")
+    for s in league.standings:
+        failed = f" ({100.0 * s.failures / s.runs:.2g})" if s.failures else ""
+        texts[s.law] = f"{number(s.median.value, '.2g')}{failed}"
+    return list(texts.values())
+
+
+def _best(findings: Findings, league: League) -> str:
+    """Return the laws of rank 1 that completed a flight, unless these are all laws."""
+    first = [s.law for s in league.standings if s.rank == 1 and s.failures < s.runs]
+    if len(first) == len(league.standings) > 1:
+        return NO_DIFFERENCE
+    return ", ".join(findings.names[law] for law in first) or "-"
+
+
+def influence_tables(findings: Findings) -> list[Table]:
+    """Tabulate the strongest significant influences, one table per law and quantity."""
+    columns = _columns(["variable"], ["rank corr.", "interval", "spread", "p"])
+    tables = []
+    for point, quantity, result in findings.sensitivities:
+        rows = []
+        for i in result.influences[:STRONGEST]:
+            best = i.best_correlation
+            cells = [f"{best.value:.2f}", span(best, ".2f")] if best else ["-", "-"]
+            if i.p < 1.0 - CONFIDENCE:
+                rows.append([i.variable, *cells, f"{i.spread:.1%}", f"{i.p:.2g}"])
+        title = _titled(findings.names[result.law], quantity.heading, point.point)
+        if result.explained is not None:
+            title += f": {result.explained:.0%} explained by all"
+        if rows:
+            tables.append(Table.of(title, columns, rows))
+    return tables
+
+
+def sobol_tables(findings: Findings) -> list[Table]:
+    """Tabulate Sobol indices, one table per law and metric."""
+    columns = _columns(["variable"], ["first", "interval", "total", "interval"])
+    tables = []
+    for each in findings.sobol:
+        left_out = f"; {each.left_out} with failed flights left out" if each.left_out else ""
+        title = f"Sobol indices, {each.law}, {each.metric}: {each.rows} rows of the design"
+        rows = [
+            [i.variable, *(text for e in (i.first, i.total) for text in _index(e))]
+            for i in each.indices[:STRONGEST]
+        ]
+        tables.append(Table.of(title + left_out, columns, rows))
+    return tables
+
+
+def _index(estimate: Estimate) -> tuple[str, str]:
+    return f"{estimate.value:.3f}", span(estimate, ".3f")
+
+
+def worst_table(findings: Findings, point: GridPoint, quantity: Quantity, law: str = "") -> Table:
+    """Tabulate the worst runs, with the command that flies the first of them again."""
+    worst = findings.worst(point, quantity, law=law)
+    values = [_value(row, quantity) for row in worst.to_dict("records")]
+    runs, laws = worst["run"].tolist(), worst["law"].tolist()
+    notes = [findings.rerun_command(runs[0], laws[0])]
+    if len(set(values)) == 1 and len(values) == WORST:
+        rows = point.table[point.table["law"] == law] if law else point.table
+        same = sum(_value(row, quantity) == values[0] for row in rows.to_dict("records"))
+        notes.insert(
+            0,
+            f"All {WORST} are equal, as {same:,} of {len(rows):,} flights are: {values[0]}; none "
+            "of them is worse than the others.",
+        )
+    title = f"Worst runs by {_titled(quantity.label, point.point, findings.names.get(law, ''))}"
+    texts = [list(map(str, row)) for row in zip(runs, laws, values, strict=True)]
+    columns = [Column("run"), Column("law", is_label=True), Column("value")]
+    return Table(title, columns, [Group(texts)], notes)
+
+
+def _value(row: dict[Any, Any], quantity: Quantity) -> str:
+    if row["outcome"] == "complete":
+        return number(float(row[quantity.column]), ".4g")
+    return f"{row['outcome']} at {row['ended_at_s']:.3g} s"
