@@ -31,7 +31,8 @@ from space_robot_sim.environment.neighbouring_orbit import target_state
 from space_robot_sim.plant.settings import PLANT_KINDS, PlantNodeSettings
 
 from .disturbances import table_parameters
-from .objects import NODES, AnyLaw, resolve_law, robot_setting
+from .objects import NODES as NODES
+from .objects import AnyLaw, resolve_law, robot_setting
 from .options import OPTIONS
 from .scenario import NO_FRICTION, Scenario
 
