@@ -71,7 +71,7 @@ setup(
         "llvmlite>=0.41",  # numba has the versions that fit
         "numba>=0.58.1",
         "numpy>=1.26,<3",
-        "pydantic>=2.5",
+        "pydantic>=2.7",
         "pyyaml>=6",
         "rich>=13",
         "rosbags>=0.11",

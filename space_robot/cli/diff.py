@@ -37,7 +37,7 @@ def diff(first: Path, second: Path, as_json: bool) -> None:
     from ..console.terminal_tables import print_table
     from ..scenario.comparison import differences
 
-    changes = differences(_scenario_of(first), _scenario_of(second))
+    changes = list(differences(_resolved(first), _resolved(second)))
     if as_json:
         echo_json([difference._asdict() for difference in changes])
     elif not changes:
@@ -50,13 +50,15 @@ def diff(first: Path, second: Path, as_json: bool) -> None:
         click.get_current_context().exit(1)
 
 
-def _scenario_of(path: Path) -> dict[str, Any]:
-    from ..flight.plan import Flight, resolve
-    from ..scenario.comparison import read_scenario, recorded_scenario
+def _resolved(path: Path) -> dict[str, Any]:
+    from space_robot_msgs_py.config.validation import read_yaml, validate
 
-    if path.suffix in (".yaml", ".yml"):
-        return Flight(resolve(read_scenario(path))).scenario.tree
-    return recorded_scenario(path)
+    from ..flight.plan import Flight, Scenario, resolve
+    from ..scenario.comparison import recorded_scenario
+
+    if path.suffix not in (".yaml", ".yml"):
+        return recorded_scenario(path)
+    return Flight(resolve(validate(Scenario, read_yaml(path), str(path)))).scenario.tree
 
 
 def _short(value: Any) -> str:

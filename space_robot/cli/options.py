@@ -147,10 +147,7 @@ class NameOrNumbers(click.ParamType[Any]):
 
 
 def _use_scenario(
-    context: click.Context,
-    option: click.Parameter,
-    path: Path | None,
-    ignored: Collection[str] = (),
+    context: click.Context, option: click.Parameter, path: Path | None, ignored: Collection[str]
 ) -> None:
     """Use the values of a scenario file as defaults of a command's options."""
     if path is None:
@@ -171,6 +168,17 @@ def _use_scenario(
     context.meta[_PARAMETERS] = validate(Scenario, flown, str(path)).parameters
     content.pop("parameters", None)
     context.default_map = {**(context.default_map or {}), **content}
+
+
+def _scenario_option(help: str, ignored: Collection[str] = ()) -> Decorator:
+    return click.option(
+        "--scenario",
+        type=click.Path(path_type=Path),
+        is_eager=True,
+        callback=partial(_use_scenario, ignored=ignored),
+        expose_value=False,
+        help=help,
+    )
 
 
 def _parameters(
@@ -201,21 +209,11 @@ OTHERS: dict[str, Decorator] = {
         callback=_parameters,
         help="Any parameter of a node, as plant.hold_ticks=40; may be repeated.",
     ),
-    "scenario": click.option(
-        "--scenario",
-        type=click.Path(path_type=Path),
-        is_eager=True,
-        callback=_use_scenario,
-        expose_value=False,
-        help="YAML file with any of these options; those given here come first.",
+    "scenario": _scenario_option(
+        "YAML file with any of these options; those given here come first."
     ),
-    "scenario_of_flight": click.option(
-        "--scenario",
-        type=click.Path(path_type=Path),
-        is_eager=True,
-        callback=partial(_use_scenario, ignored=OPTIONS),
-        expose_value=False,
-        help="YAML file of a flight's options, of which those of this command count.",
+    "scenario_of_flight": _scenario_option(
+        "YAML file of a flight's options, of which those of this command count.", OPTIONS
     ),
     "json": click.option("--json", "as_json", is_flag=True, help="Print the report as JSON."),
 }

@@ -212,7 +212,7 @@ class FlightBench(RecordOwner):
         if not isinstance(snapshot, Snapshot):
             raise InputError(f"snapshot: what `save` returned was expected, got {short(snapshot)}")
         here, there = self.flight.scenario.tree, snapshot.scenario
-        if there is not here and (changes := differences(there, here)):
+        if there is not here and (changes := [*differences(there, here)]):
             path, old, new = changes[0]
             raise InputError(
                 f"the snapshot is of another scenario: {path} is {short(old)} there, "

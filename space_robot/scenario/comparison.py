@@ -8,10 +8,7 @@ from typing import Any, NamedTuple
 
 from space_robot_msgs_py.bag.description import read_description
 from space_robot_msgs_py.bag.folder import open_bag
-from space_robot_msgs_py.config.validation import read_yaml, validate
 from space_robot_msgs_py.errors import InputError
-
-from .scenario import Scenario
 
 
 class ChangedNumber(NamedTuple):
@@ -28,7 +25,7 @@ def recorded_scenario(bag: Path) -> dict[str, Any]:
     """Return the resolved scenario of a recorded flight.
 
     Raises:
-        InputError: If there is no bag, or it was recorded by a version that kept no scenario.
+        InputError: there is no bag, or it was recorded by a version that kept no scenario.
     """
     flight = read_description(open_bag(bag).custom_data())
     if not isinstance(numbers := flight.get("scenario"), Mapping) or "robot_file" not in flight:
@@ -39,29 +36,16 @@ def recorded_scenario(bag: Path) -> dict[str, Any]:
     return {**numbers, **robots}
 
 
-def read_scenario(file: Path) -> Scenario:
-    """Return the scenario in a file.
-
-    Raises:
-        InputError: If the file cannot be read, or an option in it is wrong.
-    """
-    return validate(Scenario, read_yaml(file), str(file))
-
-
-def differences(first: Mapping[str, Any], second: Mapping[str, Any]) -> list[ChangedNumber]:
-    """Return the differences of two resolved scenarios, in the order of the first's keys."""
-    return list(_compared("", first, second))
-
-
-def _compared(path: str, first: Any, second: Any) -> Iterator[ChangedNumber]:
+def differences(first: Any, second: Any, path: str = "") -> Iterator[ChangedNumber]:
+    """Yield the differences of two resolved scenarios, in the order of the first's keys."""
     if isinstance(first, Mapping) and isinstance(second, Mapping):
         for key in dict.fromkeys((*first, *second)):
             inner = f"{path}.{key}" if path else str(key)
-            yield from _compared(inner, first.get(key), second.get(key))
+            yield from differences(first.get(key), second.get(key), inner)
     elif _are_records(first) and _are_records(second) and len(first) == len(second):
         for number, (one, other) in enumerate(zip(first, second, strict=True)):
             name = one.get("name", number) if one.get("name") == other.get("name") else number
-            yield from _compared(f"{path}.{name}", one, other)
+            yield from differences(one, other, f"{path}.{name}")
     elif first != second:
         yield ChangedNumber(path, first, second)
 

@@ -31,6 +31,7 @@ from space_robot_sim.environment.neighbouring_orbit import target_state
 from space_robot_sim.plant.settings import PLANT_KINDS, PlantNodeSettings
 
 from .disturbances import table_parameters
+from .objects import NODES as NODES
 from .objects import AnyLaw, resolve_law, robot_setting
 from .options import OPTIONS
 from .scenario import NO_FRICTION, Scenario
@@ -41,7 +42,7 @@ SCHEMAS: tuple[type[NodeSettings], ...] = (
     MissionNodeSettings,
     RecorderNodeSettings,
 )
-NODES = tuple(schema.node for schema in SCHEMAS)
+
 
 _WAITING = "a flight's nodes wait for one another as they must"
 NOT_TO_BE_SET = {

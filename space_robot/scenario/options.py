@@ -244,15 +244,15 @@ OPTIONS: dict[str, Option] = {}
 
 
 def _read_fields() -> None:
-    """Collect the options; Pydantic finds defaults and limits in their places."""
+    """Collect the options; Pydantic finds types, limits and defaults in their places."""
     for name, hint in get_type_hints(Options).items():
-        if isinstance(declared := vars(Options)[name], Option):
-            OPTIONS[name] = declared.with_type(hint)
-            ends = ((Ge, declared.low), (Le, declared.high), (Gt, declared.above))
-            limits = [limit(value) for limit, value in ends if value is not None]
-            if limits:
+        Options.__annotations__[name] = hint
+        if isinstance(option := vars(Options)[name], Option):
+            OPTIONS[name] = option.with_type(hint)
+            ends = ((Ge, option.low), (Le, option.high), (Gt, option.above))
+            if limits := [limit(value) for limit, value in ends if value is not None]:
                 Options.__annotations__[name] = Annotated[(hint, *limits)]
-            setattr(Options, name, declared.default)
+            setattr(Options, name, option.default)
 
 
 _read_fields()

@@ -30,23 +30,26 @@ from .robots import Robots
 from .scenario import Scenario
 
 
-def resolve(plan: Scenario) -> ResolvedScenario:
+def resolve(scenario: Scenario) -> ResolvedScenario:
     """Read all files that the options name, and check that they fit together.
 
-    Args:
-        plan: options; single parameters of nodes override the others.
+    Single parameters of nodes override the other options.
 
     Raises:
         InputError: a name does not exist, or settings conflict.
     """
-    plan = _without_nodes(plan)
-    settings = FlightSettings.resolve(plan)
+    with explained_by("disturbances"):
+        faults = parse_faults(scenario.faults_of(PROCESS_KINDS), KINDS)
+    _check_nodes(scenario, faults)
+    if "controller" in scenario.without:
+        scenario = scenario.model_copy(update={"controller": None})
+    settings = FlightSettings.resolve(scenario)
     with explained_by("own-robot"):
-        robots = Robots.read(settings, plan.robot, plan.plant_robot)
-    laws = _laws(plan, settings, robots.plant.n + 3)
-    scenario = ResolvedScenario(
+        robots = Robots.read(settings, scenario.robot, scenario.plant_robot)
+    laws = _laws(scenario, settings, robots.plant.n + 3)
+    resolved = ResolvedScenario(
         **vars(settings),
-        options=plan,
+        options=scenario,
         mission_name=settings.mission.mission or robot_files(settings.mission.robot).name,
         robots=robots,
         reference=_mission(settings, robots.controller),
@@ -55,13 +58,34 @@ def resolve(plan: Scenario) -> ResolvedScenario:
             (tick, laws[one_of(name, laws, "controller", " of swaps")])
             for tick, name in parse_swaps(settings.controller.swaps, settings.plant.period)
         ],
-        assumed_actuators=_assumed_actuators(plan, settings, robots.controller),
-        process_faults=_process_faults(plan),
+        assumed_actuators=_assumed_actuators(scenario, settings, robots.controller),
+        process_faults=faults,
     )
-    _check_composed(plan)
-    _check_disturbance(plan, scenario)
-    _check_actuators(scenario)
-    return _with_sampled_disturbance(scenario) if callable(plan.disturbance) else scenario
+    _check_disturbance(resolved)
+    _check_actuators(resolved)
+    return _with_sampled_disturbance(resolved) if callable(scenario.disturbance) else resolved
+
+
+def _check_nodes(scenario: Scenario, faults: list[Fault]) -> None:
+    """Check what is asked of nodes that are not started, or have no process of their own."""
+    for node in scenario.without:
+        asked = [
+            name
+            for name, option in OPTIONS.items()
+            if option.node == node and getattr(scenario, name) not in (option.default, None)
+        ]
+        asked += [f"{node}.{name}" for name in scenario.parameters.get(node, {})]
+        asked += [f"fault {fault}" for fault in faults if NODE_OF[fault.kind] == node]
+        if asked:
+            raise InputError(
+                f"{', '.join(asked)}: that is for the project's {node}, which `without` leaves out"
+            )
+    asked = [f"fault {fault}" for fault in faults]
+    asked += [name for name in ("restart_controller", "without") if getattr(scenario, name)]
+    if scenario.composed and asked:
+        raise InputError(
+            f"{', '.join(asked)}: that needs a process for each node: fly without --composed"
+        )
 
 
 def _with_sampled_disturbance(scenario: ResolvedScenario) -> ResolvedScenario:
@@ -92,36 +116,31 @@ def _mission(settings: FlightSettings, robot: Robot) -> Mission:
             raise InputError(f"{file}: {error}") from None
 
 
-@explained_by("disturbances")
-def _process_faults(plan: Scenario) -> list[Fault]:
-    return parse_faults(plan.faults_of(PROCESS_KINDS), KINDS)
-
-
-def _laws(plan: Scenario, settings: FlightSettings, axes: int) -> dict[str, ControlLaw]:
-    if plan.controller is None:
+def _laws(scenario: Scenario, settings: FlightSettings, axes: int) -> dict[str, ControlLaw]:
+    if scenario.controller is None:
         return {NoLaw.name: NoLaw({}, settings.plant.period, axes)}
-    own = resolve_law(plan.controller)
+    own = resolve_law(scenario.controller)
     with explained_by("gains"):
-        if not plan.has_chosen_law:  # a robot's folder runs no code by naming it
+        if not scenario.has_chosen_law:  # a robot's folder runs no code by naming it
             one_of(settings.controller.controller, known_laws(), "controller", f" of {OF_THE_SET}")
         return build_laws(settings.controller, axes, settings.gains, own or "")
 
 
 def _assumed_actuators(
-    plan: Scenario, settings: FlightSettings, robot: Robot
+    scenario: Scenario, settings: FlightSettings, robot: Robot
 ) -> BaseActuatorSettings:
     name = settings.controller.actuators
-    if isinstance(plan.assumed_actuators, str):
+    if isinstance(scenario.assumed_actuators, str):
         try:
-            return assumed_actuators(plan.assumed_actuators, robot)
+            return assumed_actuators(scenario.assumed_actuators, robot)
         except InputError as error:
             raise InputError(f"assumed_actuators: {error}") from None
-    if plan.assumed_actuators is not None:
-        own, option = plan.assumed_actuators, "assumed_actuators"
+    if scenario.assumed_actuators is not None:
+        own, option = scenario.assumed_actuators, "assumed_actuators"
     elif name != GIVEN:
         return assumed_actuators(name, robot)
     else:
-        numbers = plan.actuators if isinstance(plan.actuators, dict) else {}
+        numbers = scenario.actuators if isinstance(scenario.actuators, dict) else {}
         own = {key: numbers[key] for key in BaseActuatorSettings.model_fields if key in numbers}
         option = "actuators"
     assumed = validate(BaseActuatorSettings, own, option)
@@ -129,45 +148,12 @@ def _assumed_actuators(
     return assumed
 
 
-def _without_nodes(plan: Scenario) -> Scenario:
-    """Check what is asked of nodes that are not started; a flight without controller has no law.
-
-    Raises:
-        InputError: something is.
-    """
-    for node in plan.without:
-        asked = [
-            name
-            for name, option in OPTIONS.items()
-            if option.node == node and getattr(plan, name) not in (option.default, None)
-        ]
-        asked += [f"{node}.{name}" for name in plan.parameters.get(node, {})]
-        faults = parse_faults(plan.faults_of(PROCESS_KINDS), KINDS)
-        asked += [f"fault {fault}" for fault in faults if NODE_OF[fault.kind] == node]
-        if asked:
-            raise InputError(
-                f"{', '.join(asked)}: that is for the project's {node}, which `without` leaves out"
-            )
-    return plan.model_copy(update={"controller": None}) if "controller" in plan.without else plan
-
-
-def _check_composed(plan: Scenario) -> None:
-    if not plan.composed:
-        return
-    asked = [f"fault {fault}" for fault in plan.faults_of(PROCESS_KINDS)]
-    asked += [name for name in ("restart_controller", "without") if getattr(plan, name)]
-    if asked:
-        raise InputError(
-            f"{', '.join(asked)}: that needs a process for each node: fly without --composed"
-        )
-
-
 @explained_by("disturbances")
-def _check_disturbance(plan: Scenario, scenario: ResolvedScenario) -> None:
+def _check_disturbance(scenario: ResolvedScenario) -> None:
     """Check the columns of a file that was given, which the plant does not know, for the robot."""
     if not (text := scenario.plant.disturbance.table):
         return
-    parameters = option_parameters(plan)["plant"]
+    parameters = option_parameters(scenario.options)["plant"]
     file = dict(flatten(nest(parameters))).get("disturbance.table", "")
     if file and not file.startswith(JSON):
         joints = scenario.plant.robot_names(scenario.robots.plant).joints

@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from operator import attrgetter
 from typing import Any
 
 from pydantic import BaseModel
@@ -147,13 +148,13 @@ class ResolvedScenario(FlightSettings):
         It is a mapping of options as `Scenario` takes them, so that a printed one can be flown.
         Equal trees fly equal bits.
         """
-        tree = {name: number(self) for name, number in NUMBERS.items()}
+        tree = {name: number(self) for name, number in ALWAYS_SHOWN.items()}
         options = {name: getattr(self.options, name) for name in OPTIONS.keys() - HIDDEN}
-        optional = options | {name: number(self) for name, number in OPTIONAL.items()}
+        optional = options | {name: number(self) for name, number in SHOWN_IF_SET.items()}
         return tree | {
             name: optional[name]
             for name, option in OPTIONS.items()
-            if name not in NUMBERS and optional.get(name, option.default) != option.default
+            if name not in ALWAYS_SHOWN and optional.get(name, option.default) != option.default
         }
 
     def description(self, plant: Plant) -> dict[str, Any]:
@@ -235,14 +236,6 @@ def _parameters(scenario: ResolvedScenario) -> dict[str, Tree]:
     return parameters
 
 
-def _plant(name: str) -> Callable[[ResolvedScenario], Any]:
-    return lambda scenario: getattr(scenario.plant, name)
-
-
-def _controller(name: str) -> Callable[[ResolvedScenario], Any]:
-    return lambda scenario: getattr(scenario.controller, name)
-
-
 SECTIONS: Mapping[str, type[BaseModel]] = {
     "case": EnvironmentSettings,
     "sensors": SensorSettings,
@@ -253,31 +246,31 @@ SECTIONS: Mapping[str, type[BaseModel]] = {
 START = ("initial_joints_deg", "initial_quaternion", "initial_rate_deg_s")
 """Settings of the plant that its mission holds."""
 SAME_IN_PLANT = ("period", "substeps", "command_latency_ticks")
-NUMBERS: Mapping[str, Callable[[ResolvedScenario], Any]] = {
-    "controller": _controller("controller"),
+ALWAYS_SHOWN: Mapping[str, Callable[[ResolvedScenario], Any]] = {
+    "controller": attrgetter("controller.controller"),
     "gains": _gains,
     "robot": lambda scenario: scenario.robots.options["robot"],
     "mission": _mission,
     "events": lambda scenario: [text for text in scenario.plant.events if text.strip()],
     **{name: _plant_numbers(SECTIONS[name]) for name in ("case", "sensors", "actuators")},
     "duration": lambda scenario: scenario.ticks * scenario.plant.period,
-    **{name: _plant(name) for name in SAME_IN_PLANT},
-    "navigation": _controller("navigation"),
-    "seed": _plant("fault_seed"),
+    **{name: attrgetter(f"plant.{name}") for name in SAME_IN_PLANT},
+    "navigation": attrgetter("controller.navigation"),
+    "seed": attrgetter("plant.fault_seed"),
     "parameters": _parameters,
 }
 """The resolved value of each option."""
-OPTIONAL: Mapping[str, Callable[[ResolvedScenario], Any]] = {
+SHOWN_IF_SET: Mapping[str, Callable[[ResolvedScenario], Any]] = {
     "plant_robot": lambda scenario: scenario.robots.options.get("plant_robot"),
     "orbit": lambda scenario: (
         _plant_numbers(OrbitSettings)(scenario) if scenario.plant.has_orbit else "none"
     ),
     "disturbance": _disturbance,
     "assumed_actuators": _assumed_actuators,
-    "faults": lambda scenario: list(scenario.faults),
-    "swaps": lambda scenario: scenario.swap_texts,
-    **{name: _plant(name) for name in ("realtime", "paused", "fifo_priority")},
-    **{name: _controller(name) for name in ("controller_code", "shadow")},
+    "faults": attrgetter("faults"),
+    "swaps": attrgetter("swap_texts"),
+    **{name: attrgetter(f"plant.{name}") for name in ("realtime", "paused", "fifo_priority")},
+    **{name: attrgetter(f"controller.{name}") for name in ("controller_code", "shadow")},
 }
 """Of options that are left out at their defaults; those not named here are as they were given."""
 HIDDEN = {

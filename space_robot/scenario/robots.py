@@ -14,7 +14,7 @@ from space_robot_msgs_py.errors import InputError
 from .node_settings import FlightSettings
 from .objects import robot_setting
 
-Source = tuple[Robot, Tree | None]
+RobotAndFile = tuple[Robot, Tree | None]
 """A robot, and the content of its file; None: of a robot in memory, whose own numbers count."""
 
 
@@ -22,8 +22,8 @@ Source = tuple[Robot, Tree | None]
 class Robots:
     """The robots of plant and controller, which have the same joints."""
 
-    true: Source
-    assumed: Source
+    true: RobotAndFile
+    assumed: RobotAndFile
 
     @classmethod
     def read(cls, settings: FlightSettings, robot: Any, plant_robot: Any = None) -> Robots:
@@ -89,7 +89,7 @@ class Robots:
         }
 
 
-def _source(robot: str | Robot | Tree) -> Source:
+def _source(robot: str | Robot | Tree) -> RobotAndFile:
     if isinstance(robot, str):
         file = robot_source(robot)
         return file.robot, file.content
