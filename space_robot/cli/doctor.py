@@ -39,7 +39,7 @@ def doctor(as_json: bool) -> None:
     for item in examine():
         items.append(item)
         if not as_json:
-            _show(item)
+            _print(item)
     is_able, is_able_with_ros = can_fly(items), can_fly_with_ros(items)
     if as_json:
         echo_json(
@@ -48,23 +48,19 @@ def doctor(as_json: bool) -> None:
                 "can_fly_with_ros": is_able_with_ros,
                 "commit": commit(),
                 "versions": versions(),
-                "items": [item.as_record() for item in items],
+                "items": [item._asdict() for item in items],
             }
         )
+    elif not is_able:
+        click.echo("flights cannot run")
+    elif not is_able_with_ros:
+        click.echo("flights can run in one process (simulate), but not as ROS 2 nodes (fly)")
     else:
-        click.echo(_verdict(is_able, is_able_with_ros))
+        click.echo("flights can run, in one process (simulate) and as ROS 2 nodes (fly)")
     click.get_current_context().exit(0 if is_able else 1)
 
 
-def _verdict(is_able: bool, is_able_with_ros: bool) -> str:
-    if not is_able:
-        return "flights cannot run"
-    if not is_able_with_ros:
-        return "flights can run in one process (simulate), but not as ROS 2 nodes (fly)"
-    return "flights can run, in one process (simulate) and as ROS 2 nodes (fly)"
-
-
-def _show(item: CheckedItem) -> None:
+def _print(item: CheckedItem) -> None:
     from space_robot_msgs_py.config.text import printable
 
     status = click.style(f"{item.status:8}", fg=COLOURS[item.status])

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from .options import flight_options, plan_flight
+
+if TYPE_CHECKING:
+    from ..export.verify import ReplayVerdict
 
 SECTION = "Flight code"
 
@@ -85,14 +89,13 @@ def export(
     from space_robot_msgs_py.errors import FlightError
 
     from ..console.progress import counting_progress
-    from ..console.terminal import echo_json, terminal
+    from ..console.terminal import echo_json
     from ..export.folder import check_folder, write_folder, write_readme
     from ..export.recorded import recorded_flights
     from ..export.software import export as exported_of
     from ..export.verify import verify
     from ..flight.compilation import compile_kernels
     from ..scenario.scenario import Scenario
-    from .export_display import print_export, print_verdicts
 
     check_folder(out, force)
     flight = plan_flight(**options)
@@ -118,7 +121,50 @@ def export(
             }
         )
     else:
-        print_export(out, exported, written, terminal())
-        print_verdicts(verdicts, terminal())
+        _print_export(out, exported.figures(), written)
+        _print_verdicts(verdicts)
     if wrong := [v for v in verdicts if not v.is_accepted]:
         raise FlightError("; ".join(f"{v.target}: {v.reason}" for v in wrong))
+
+
+def _print_export(
+    folder: Path, figures: Mapping[str, Any], flights: Sequence[tuple[str, str, int]]
+) -> None:
+    from ..console.tables import Column, Table
+    from ..console.terminal import say, terminal
+    from ..console.terminal_tables import print_table
+
+    console = terminal()
+    say(
+        console,
+        f"{folder}: laws {', '.join(figures['laws'])}; {figures['functions']} kernels, "
+        f"{figures['lines']} lines of C99, {figures['state_bytes']} bytes of state",
+    )
+    columns = (
+        Column("flight", is_label=True),
+        Column("what", is_label=True),
+        Column("states", spec="d"),
+    )
+    print_table(Table.of("Recorded flights", columns, flights), console)
+    say(console, f"replay them: make -C {folder}")
+
+
+def _print_verdicts(verdicts: Sequence[ReplayVerdict]) -> None:
+    if not verdicts:
+        return
+    from ..console.tables import Column, JudgedCell, Table
+    from ..console.terminal import terminal
+    from ..console.terminal_tables import print_table
+
+    columns = (
+        Column("target", is_label=True),
+        Column("states", spec="d"),
+        Column("tick", "ns", ".0f"),
+        Column("verdict", is_label=True),
+    )
+    good = JudgedCell("", "every bit equal", "good")
+    rows = [
+        (v.target, v.states, v.tick_ns, good if v.is_accepted else JudgedCell("", v.reason, "bad"))
+        for v in verdicts
+    ]
+    print_table(Table.of("Acceptance", columns, rows), terminal())

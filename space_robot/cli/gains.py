@@ -66,8 +66,7 @@ def check(as_json: bool, mass_uncertainty: float, **options: Any) -> None:
     from space_robot_msgs_py.errors import SpaceRobotError
 
     from ..console.terminal import echo_json, terminal
-    from .gains_checked import checked, report_of
-    from .gains_display import print_checks
+    from .gains_check import checked, print_checks, report_of
 
     checks = checked(options, mass_uncertainty)
     if as_json:

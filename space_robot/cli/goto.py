@@ -7,14 +7,26 @@ from typing import Any
 
 import click
 
-from .numbers import FiniteRange
+from .numbers import FiniteRange, NumberList
 
 SECTION = "Fly"
 
 
+def _attitude(
+    context: click.Context, option: click.Parameter, text: str | None
+) -> dict[str, Any] | None:
+    if text is None:
+        return None
+    if text.isalpha():
+        return {"point": text}
+    return {"rpy_deg": NumberList(3).convert(text, option, context)}
+
+
 @click.command()
-@click.option("--tool", metavar="X,Y,Z", help="Position of the tool, m.")
-@click.option("--rpy", metavar="R,P,Y", help="Orientation of the tool, degrees.")
+@click.option("--tool", type=NumberList(3), metavar="X,Y,Z", help="Position of the tool, m.")
+@click.option(
+    "--rpy", type=NumberList(3), metavar="R,P,Y", help="Orientation of the tool, degrees."
+)
 @click.option(
     "--frame",
     type=click.Choice(["start", "inertial", "base", "orbit"]),
@@ -22,9 +34,12 @@ SECTION = "Fly"
     show_default=True,
     help="Of the tool's goal; start: relative to where the tool is; orbit: so, on its axes.",
 )
-@click.option("--joints", metavar="A,B,...", help="Positions of all joints, degrees or m.")
+@click.option(
+    "--joints", type=NumberList(), metavar="A,B,...", help="Positions of all joints, degrees or m."
+)
 @click.option(
     "--base",
+    callback=_attitude,
     metavar="R,P,Y|POINT",
     help="Attitude of the base, degrees, or what it points at: nadir, velocity, sun, target.",
 )
@@ -63,39 +78,21 @@ def goto(domain: int | None, namespace: str, **options: Any) -> None:
 
 
 def _segment(
-    tool: str | None,
-    rpy: str | None,
+    tool: list[float] | None,
+    rpy: list[float] | None,
     frame: str,
-    joints: str | None,
-    base: str | None,
+    joints: list[float] | None,
+    base: dict[str, Any] | None,
     duration: float | None,
 ) -> dict[str, Any]:
     segment: dict[str, Any] = {"duration": duration or "fast"}
-    if tool is not None or rpy is not None:
-        goal: dict[str, Any] = {"frame": frame}
-        if tool is not None:
-            goal["xyz"] = _numbers(tool, "--tool", 3)
-        if rpy is not None:
-            goal["rpy_deg"] = _numbers(rpy, "--rpy", 3)
-        segment["tool"] = goal
-    if joints is not None:
-        segment["joints_deg"] = _numbers(joints, "--joints")
-    if base is not None:
-        is_name = base.isalpha()
-        segment["base"] = {"point": base} if is_name else {"rpy_deg": _numbers(base, "--base", 3)}
+    if tool or rpy:
+        goal = {"frame": frame, "xyz": tool, "rpy_deg": rpy}
+        segment["tool"] = {key: value for key, value in goal.items() if value}
+    if joints:
+        segment["joints_deg"] = joints
+    if base:
+        segment["base"] = base
     if len(segment) == 1:
         raise click.UsageError("give --tool, --rpy, --joints or --base")
     return segment
-
-
-def _numbers(text: str, option: str, count: int = 0) -> list[float]:
-    try:
-        numbers = [float(part) for part in text.split(",")]
-    except ValueError:
-        numbers = []
-    if not numbers or (count and len(numbers) != count):
-        expected = f"{count} numbers" if count else "numbers"
-        raise click.BadParameter(
-            f"{expected} separated by commas were expected, got {text!r}", param_hint=option
-        )
-    return numbers

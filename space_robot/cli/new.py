@@ -13,6 +13,7 @@ from click.shell_completion import CompletionItem
 
 from . import new_files
 from .completed_names import names_in
+from .numbers import NumberList
 from .options import BASE, REPAIR, flight_options
 
 if TYPE_CHECKING:
@@ -62,23 +63,6 @@ def _springs(
             raise click.BadParameter(f"{joint} occurs twice")
         springs[joint] = {"stiffness": stiffness, "damping": damping}
     return springs
-
-
-def _numbers(
-    context: click.Context, option: click.Parameter, text: str | None
-) -> list[float] | None:
-    """Parse numbers with commas between them: three, or six of an inertia."""
-    if text is None:
-        return None
-    try:
-        values = [float(word) for word in text.split(",")]
-    except ValueError:
-        values = []
-    counts = (3, 6) if option.name == "base_inertia" else (3,)
-    if len(values) not in counts or not all(map(math.isfinite, values)):
-        wanted = " or ".join(map(str, counts))
-        raise click.BadParameter(f"{wanted} numbers were expected, as 1,2,3, got {text!r}")
-    return values if counts == (3,) else [*values, 0.0, 0.0, 0.0][:6]
 
 
 def _mount(
@@ -160,19 +144,19 @@ def new() -> None:
 )
 @click.option(
     "--base-inertia",
-    callback=_numbers,
+    type=NumberList(3, 6),
     metavar="IXX,IYY,IZZ[,IXY,IXZ,IYZ]",
     help="Inertia of that satellite about its centre of mass, kg m2.",
 )
 @click.option(
     "--at",
-    callback=_numbers,
+    type=NumberList(3),
     metavar="X,Y,Z",
     help="Where the arm's root is on the satellite's, m [default: 0,0,0].",
 )
 @click.option(
     "--rpy-deg",
-    callback=_numbers,
+    type=NumberList(3),
     metavar="R,P,Y",
     help="Roll, pitch, yaw of the arm's root on the satellite, degrees [default: 0,0,0].",
 )
@@ -219,6 +203,8 @@ def new_robot(
     from ..console.terminal_tables import print_table
     from ..flight.compilation import compile_kernels
 
+    if base_inertia:
+        base_inertia = [*base_inertia, 0.0, 0.0, 0.0][:6]
     files = robot_files(robot_as_path(robot))
     words = ["space-robot", "new", robot, *(["--base", base] if base else [])]
     words += ["--repair"] if repair else []

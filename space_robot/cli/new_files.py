@@ -38,7 +38,7 @@ def _is_law(name: str) -> bool:
     return name in laws() or name == NoLaw.name
 
 
-def _is_file_of(kind: str) -> Callable[[str], bool]:
+def _is_in_config(kind: str) -> Callable[[str], bool]:
     def is_shipped(name: str) -> bool:
         from space_robot_msgs_py.config.files import is_named
 
@@ -57,7 +57,7 @@ SENSOR = PieceTemplate(
     "sensor",
     {"sensor.yaml": "$name.yaml", "test_sensor.py": "test_$name.py"},
     "space-robot simulate --sensors $sensor_yaml",
-    _is_file_of("sensors"),
+    _is_in_config("sensors"),
 )
 METRIC = PieceTemplate(
     "metric",
@@ -70,15 +70,15 @@ MISSION = PieceTemplate(
     "mission",
     {"mission.yaml": "$name.yaml", "test_mission.py": "test_$name.py"},
     "space-robot simulate$robot_option --mission $mission_yaml",
-    _is_file_of("missions"),
+    _is_in_config("missions"),
 )
 
 
-def check_word(name: str, piece: PieceTemplate) -> None:
-    """Check that the name of a new piece is a word in lower case.
+def check_name(name: str, piece: PieceTemplate) -> None:
+    """Check that a new piece may have a name.
 
     Raises:
-        InputError: it is none, or pytest would take its file for tests.
+        InputError: it is no word in lower case, or pytest would take its file for tests.
     """
     is_word = name.isidentifier() and name.isascii() and name == name.lower()
     if not is_word or keyword.iskeyword(name) or name.startswith(("_", "test")):
@@ -89,11 +89,10 @@ def check_word(name: str, piece: PieceTemplate) -> None:
 
 
 def check_not_taken(name: str, piece: PieceTemplate) -> None:
-    """Check that no other piece has the name of a new one.
+    """Check that no other piece has a name, and no Python module, which a file of it would hide.
 
     Raises:
-        InputError: it belongs to a shipped piece, or to a Python module, which a file of that name
-            would hide.
+        InputError: one has it.
     """
     if piece.is_shipped(name):
         raise InputError(f"{name} is the name of a shipped {piece.name}: choose another")
@@ -104,20 +103,10 @@ def check_not_taken(name: str, piece: PieceTemplate) -> None:
 
 
 def write_files(piece: PieceTemplate, name: str, folder: Path, words: Mapping[str, str]) -> str:
-    """Write the files of a new piece; return the command that uses it.
-
-    Args:
-        piece: kind of the piece.
-        name: of the piece.
-        folder: to write to; it is made.
-        words: further words of the templates.
-
-    Raises:
-        InputError: the name is not allowed, or a file exists or cannot be written.
-    """
+    """Write the files of a new piece, with further words of its templates; return its command."""
     from ..console.files import check_free, write_text  # slow to import
 
-    check_word(name, piece)
+    check_name(name, piece)
     paths = {
         key: folder / Template(file).substitute(name=name) for key, file in piece.files.items()
     }
@@ -148,9 +137,7 @@ def write_files(piece: PieceTemplate, name: str, folder: Path, words: Mapping[st
 OUT = folder_option("--out", help="Folder for the files [default: the current one].")
 
 
-def _command_of(piece: PieceTemplate, text: str, example: str) -> click.Command:
-    """Make the command ``new KIND NAME``."""
-
+def _make_command(piece: PieceTemplate, text: str, example: str) -> click.Command:
     def make(name: str, out: Path | None) -> None:
         click.echo(write_files(piece, name, out or Path(), {}))
 
@@ -165,19 +152,19 @@ def _command_of(piece: PieceTemplate, text: str, example: str) -> click.Command:
     return click.command(piece.name)(click.argument("name")(OUT(make)))
 
 
-law = _command_of(
+law = _make_command(
     LAW,
     "Write a control law with gains and tests.\n\n    NAME.py has its equation, NAME.yaml its "
     "gains, test_NAME.py its tests.",
     "my_law",
 )
-sensor = _command_of(
+sensor = _make_command(
     SENSOR,
     "Write sensors with numbers and tests.\n\n    NAME.yaml has the numbers of data sheets, "
     "test_NAME.py their tests.",
     "my_sensors",
 )
-metric = _command_of(
+metric = _make_command(
     METRIC,
     "Write a metric with its tests.\n\n    NAME.py has a function of a flight's log, "
     "test_NAME.py its tests.",
@@ -201,19 +188,14 @@ def mission(name: str, out: Path | None, robot: str) -> None:
       space-robot new mission inspect
       space-robot new mission inspect --robot seven_joint
     """
-    click.echo(write_files(MISSION, name, out or Path(), _of_robot(robot)))
+    click.echo(write_files(MISSION, name, out or Path(), _mission_words(robot)))
 
 
 STEP_DEG, STEP_M = 10.0, 0.05
 """Steps of the joints in the template of a mission."""
 
 
-def _of_robot(name: str) -> dict[str, str]:
-    """Return the words of a mission's template for a robot.
-
-    Raises:
-        InputError: the robot cannot be read, or has no mission of its own.
-    """
+def _mission_words(name: str) -> dict[str, str]:
     from ..flight.plan import Scenario, resolve
 
     scenario = resolve(Scenario(robot=name))
@@ -221,9 +203,9 @@ def _of_robot(name: str) -> dict[str, str]:
     goal = []
     for joint, position in enumerate(start):
         step = STEP_M if robot.is_prismatic[joint] else STEP_DEG
-        there = list(start)
-        there[joint] += step
-        is_within = robot.from_degrees(there)[joint] < robot.limits[joint].upper
+        stepped = list(start)
+        stepped[joint] += step
+        is_within = robot.from_degrees(stepped)[joint] < robot.limits[joint].upper
         goal.append(round(position + (step if is_within else -step), 6))
     return {
         "robot": name,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -69,9 +70,8 @@ def plan(
     from ..analysis.lighter_mission import lightened_mission, mission_text, stretched_mission
     from ..analysis.mission_plan import plan_report, planned_segments
     from ..console.files import write_text
-    from ..console.terminal import echo_json, terminal
+    from ..console.terminal import echo_json
     from ..flight.mission_demand import held_base_remark
-    from .plan_display import print_plan
 
     scenario = resolve_options(mission=mission, controller=None, **options)
     robot, orbit, period = scenario.robots.controller, scenario.plant, scenario.plant.period
@@ -102,6 +102,87 @@ def plan(
     if as_json:
         echo_json(report)
     else:
-        print_plan(report, terminal())
+        _print_plan(report)
     if refused := report["refused"]:
         raise FlightError(f"refused: {refused}")
+
+
+SIGMA = (
+    "σ: smallest singular value of the tool's Jacobian, with the base's attitude held and with a "
+    "free base; its rows of translation are divided by the tool's distance from the base"
+)
+NO_MOMENTUM = 1e-9
+"""Momentum at the end of a segment up to which there is none, N m s: at rest without an orbit."""
+MANY = 1e3
+"""Share from which a percentage is printed as a power of ten."""
+
+
+def _print_plan(report: Mapping[str, Any]) -> None:
+    from ..console.tables import Column, JudgedCell, Table
+    from ..console.terminal import say, terminal
+    from ..console.terminal_tables import print_table
+
+    console = terminal()
+    segments: list[tuple[Column, Callable[[Mapping[str, Any]], Any]]] = [
+        (Column("segment", is_label=True), lambda s: f"{s['segment']} {s['motion']}"),
+        (Column("end", "s", ".2f"), lambda s: s["begin_s"] + s["duration_s"]),
+        (Column("tool", "m", ".3f"), lambda s: s["tool_travel_m"]),
+        (Column("torque", "N m", ".3g"), lambda s: s["base_torque"]),
+        (Column("momentum", "N m s", ".3g"), lambda s: s["momentum"]),
+        (Column("at its end", "N m s", ".3g"), lambda s: s["momentum_end"]),
+        (Column("σ held", "", ".2g"), lambda s: s["singular_value"]),
+        (Column("σ free", "", ".2g"), lambda s: s["free_singular_value"]),
+    ]
+    if all(s["momentum_end"] <= NO_MOMENTUM for s in report["segments"]):
+        del segments[5]
+    rows = [[value(segment) for _, value in segments] for segment in report["segments"]]
+    heads = [head for head, _ in segments]
+    print_table(Table.of("", heads, rows), console)
+    say(console, SIGMA)
+    if len(report["sources"]) > 1:
+        sources = {**report["sources"], "all, without unloading": report}
+        rows = [
+            [name.replace("_", " "), own["base_torque"], own["momentum"], own["momentum_end"]]
+            for name, own in sources.items()
+        ]
+        heads = [
+            Column("given for", is_label=True),
+            Column("torque", "N m", ".3g"),
+            Column("momentum", "N m s", ".3g"),
+            Column("at the end", "N m s", ".3g"),
+        ]
+        print_table(Table.of("", heads, rows), console)
+    verdicts = {True: JudgedCell("", "yes", "good"), False: JudgedCell("", "no", "bad")}
+    rows = [
+        [a["actuators"], _percent(a["torque"]), _percent(a["momentum"]), verdicts[a["is_feasible"]]]
+        for a in report["actuators"]
+    ]
+    heads = [
+        Column("actuators", is_label=True),
+        Column("torque", "%", ".0f"),
+        Column("momentum", "%", ".0f"),
+        Column("feasible", is_label=True),
+    ]
+    print_table(Table.of("", heads, rows), console)
+    say(
+        console,
+        f"{report['duration_s']:.2f} s; largest base torque {report['base_torque']:.3g} N m, "
+        f"largest momentum {report['momentum']:.3g} N m s",
+    )
+    margins = [
+        f"{kind} {100.0 * margin['share']:.0f} % ({margin['joint']} at {margin['time_s']:.2f} s)"
+        for kind, margin in report["joints"].items()
+    ]
+    if margins:
+        say(console, f"joints nearest to their limits: {', '.join(margins)}")
+    for key, words in (("before", "before"), ("lightened", "in the same time, with lighter paths")):
+        if other := report.get(key):
+            say(
+                console,
+                f"{words}: {other['duration_s']:.2f} s, {other['base_torque']:.3g} N m, "
+                f"{other['momentum']:.3g} N m s",
+            )
+
+
+def _percent(share: float) -> float | str:
+    return 100.0 * share if not share >= MANY else f"{100.0 * share:.1e}"

@@ -33,7 +33,7 @@ def urdf(robot: str, base: str | None, repair: bool, out: Path | None) -> None:
     from space_robot_model.robot.find import robot_as_path, robot_source
     from space_robot_model.robot.urdf_text import urdf_text
 
-    from ..console.files import whole_file
+    from ..console.files import write_text
 
     source = robot_source(robot_as_path(robot), base, repair)
     for line in source.findings:
@@ -42,6 +42,5 @@ def urdf(robot: str, base: str | None, repair: bool, out: Path | None) -> None:
     if out is None:
         click.echo(text, nl=False)
         return
-    with whole_file(out, replace=True) as written:
-        written.write(text.encode())
+    write_text(text, out, replace=True)
     click.echo(f"wrote {out}", err=True)

@@ -66,7 +66,7 @@ def print_table(table: Table, console: Console, *, dense: bool = False) -> None:
             show_header=any(column.heading for column in table.columns),
             box=SIMPLE_HEAD if dense else RichTable().box,
             show_edge=not dense,
-            width=max(console.width, sum(widths) + 3 * len(widths) + console.width - room),
+            width=sum(widths) + 3 * len(widths) + (-1 if dense else 1),
         )
         for column, width in zip(part, widths, strict=True):
             justify: Any = "left" if column.is_label else "right"

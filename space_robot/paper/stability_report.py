@@ -130,7 +130,7 @@ def _lemma_1(study: StabilityStudy) -> Table:
             f"{extremes.max_at_s:.2f}",
             _verdict(f"{extremes.max:.4f} < 1", extremes.below_one),
         ]
-        for name, extremes in (("spectral norm, as printed", norm), ("spectral radius", radius))
+        for name, extremes in norms.items()
     ]
     heads = ("", "min", "max", "at t (s)", "below 1")
     columns = [Column(head, is_label=not head) for head in heads]

@@ -1,13 +1,14 @@
-"""Results of ``space-robot gains check``, computed from a planned flight."""
+"""Results of ``space-robot gains check``, computed from a planned flight; JSON and tables."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from rich.console import Console
 
 from space_robot_control.controller.gains import available_laws
 from space_robot_control.laws import ControlLaw
@@ -15,13 +16,16 @@ from space_robot_control.laws.base import NO_ESTIMATE, NOMINAL_INERTIA
 from space_robot_msgs_py.config.validation import validate
 from space_robot_msgs_py.errors import FlightError, InputError
 
+from ..console.tables import Column, Group, JudgedCell, Table
+from ..console.terminal import say
+from ..console.terminal_tables import print_table
 from ..flight.plan import Flight, Scenario, resolve
 from ..flight.simulate import simulate
 from ..scenario.node_settings import FlightSettings
 from ..tuning.flexible import FlexibleMotions, check_flexible
 from ..tuning.gain_check import GainCheck, check_gains, estimated_with, pair_corner
 from ..tuning.inertia import SAMPLING, inertia_along, sampled_reference
-from ..tuning.mass_errors import COARSE, check_masses, drawn_inertias
+from ..tuning.mass_errors import COARSE, DRAWS, check_masses, drawn_inertias
 from ..tuning.postures import postures_along
 from ..tuning.spectrum import LEAST_MARGIN
 
@@ -53,7 +57,7 @@ class Checked:
 
     @property
     def is_sound(self) -> bool:
-        """True if every law passes its check: nothing grows, and there is margin."""
+        """True if nothing grows under any law, and each has margin."""
         return all(check.is_sound for check in self.checks)
 
     @property
@@ -186,7 +190,7 @@ def held_ripple(flight: Flight, plan: Scenario) -> Array | None:
 
 
 def _first_law(plan: Scenario) -> str:
-    settings = FlightSettings.resolve(plan).controller
+    settings = FlightSettings.resolve(plan.options(), plan.parameters).controller
     names = available_laws(settings)
     if not names:
         raise InputError(f"gains {settings.gains!r} have no file for any law of this project")
@@ -194,32 +198,28 @@ def _first_law(plan: Scenario) -> str:
 
 
 def report_of(checks: Checked) -> dict[str, Any]:
-    """Return the findings as data for JSON."""
+    """Return the results as data for JSON."""
     flight = checks.flight
-    return {
-        **{
-            key: flight.description[key]
-            for key in ("robot", "mission", "case", "actuators", "gains")
-        },
+    keys = ("robot", "mission", "case", "actuators", "gains")
+    report = {
+        **{key: flight.description[key] for key in keys},
         "axes": flight.robot.axis_names,
         "is_stable": checks.is_stable,
         "is_sound": checks.is_sound,
-        **(
-            {
-                "gears": {
-                    name: {"lowest_hz": low, "highest_hz": high}
-                    for name, (low, high) in checks.frequencies.items()
-                }
-            }
-            if checks.frequencies
-            else {}
-        ),
-        **({"sensors": flight.plant_settings.sensors} if checks.ripple else {}),
-        "laws": {check.law: dict(_of_law(check, checks)) for check in checks.checks},
+    }
+    if checks.frequencies:
+        report["gears"] = {
+            name: {"lowest_hz": low, "highest_hz": high}
+            for name, (low, high) in checks.frequencies.items()
+        }
+    if checks.ripple:
+        report["sensors"] = flight.plant_settings.sensors
+    return report | {
+        "laws": {check.law: dict(_law_entries(check, checks)) for check in checks.checks}
     }
 
 
-def _of_law(check: GainCheck, checks: Checked) -> Iterable[tuple[str, Any]]:
+def _law_entries(check: GainCheck, checks: Checked) -> Iterable[tuple[str, Any]]:
     yield "is_stable", check.is_stable
     yield "is_sound", check.is_sound
     if spectrum := check.spectrum:
@@ -243,3 +243,130 @@ def _of_law(check: GainCheck, checks: Checked) -> Iterable[tuple[str, Any]]:
     if checks.ripple:
         ripple = checks.ripple[check.law]
         yield "held_ripple", None if ripple is None else ripple.tolist()
+
+
+def print_checks(checks: Checked, console: Console) -> None:
+    """Print margins and noise gains with an explanation."""
+    names = checks.flight.description
+    say(
+        console,
+        f"robot {names['robot']}, mission {names['mission']}, case {names['case']}, "
+        f"gains {names['gains']}, actuators {names['actuators']}",
+    )
+    for table in _tables(checks):
+        print_table(table, console)
+
+
+def _tables(checks: Checked) -> Iterator[Table]:
+    if any(check.spectrum for check in checks.checks):
+        yield _margins(checks)
+        masses = {check.law: check.masses for check in checks.checks if check.masses}
+        rows: list[list[Any]] = [
+            [law, own.smallest, own.largest, own.smallest_drawn, own.largest_drawn]
+            for law, own in masses.items()
+        ]
+        names = ("smallest", "largest", "smallest\ndrawn", "largest\ndrawn")
+        share = next(iter(masses.values())).share
+        title = f"The same with masses and inertias wrong by {share:.0%}"
+        note = f"Bounds for all such robots, and the extremes of {DRAWS} drawn at random."
+        yield _table(title, [Column(name, spec=".4f") for name in names], rows, note)
+    yield _loops(checks)
+    if checks.frequencies:
+        columns = [Column("lowest", spec=".3f"), Column("highest", spec=".3f")]
+        rows = [[name, *extremes] for name, extremes in checks.frequencies.items()]
+        title = "Frequency of each gear's spring along the mission, Hz"
+        yield _table(title, columns, rows)
+        yield _springs(checks)
+    gains = {check.law: check.noise_gain for check in checks.checks}
+    title = "Torque that noise on the rate of an axis becomes, N m per rad/s"
+    yield _by_axis(title, checks, gains, "N s/m")
+    if checks.ripple:
+        title = f"Torque ripple with sensors {checks.flight.plant_settings.sensors}, held still, "
+        diverged = [law for law, ripple in checks.ripple.items() if ripple is None]
+        notes = [f"Held still, {', '.join(diverged)} diverged."] if diverged else []
+        yield _by_axis(f"{title}N m RMS", checks, checks.ripple, "N", *notes)
+
+
+def _table(
+    title: str, columns: Sequence[Column], rows: Sequence[Sequence[Any]], *notes: str
+) -> Table:
+    return Table(title, [Column("", is_label=True), *columns], [Group(rows)], notes)
+
+
+def _margins(checks: Checked) -> Table:
+    columns = [Column("smallest", spec=".4f"), Column("largest", spec=".4f")]
+    columns += [Column("radius"), Column("margin")]
+    rows = []
+    for check in checks.checks:
+        if spectrum := check.spectrum:
+            tone = "good" if spectrum.is_sound else "bad"
+            word = "sound" if spectrum.margin >= LEAST_MARGIN else "small"
+            word = word if spectrum.contracts else "none"
+            radius = _holds(f"{spectrum.radius:.4f} < 1", spectrum.contracts)
+            margin = JudgedCell(f"{spectrum.margin:.2%}", word, tone)
+            rows.append([check.law, spectrum.smallest, spectrum.largest, radius, margin])
+    inertia = "H_S" if checks.flight.controls_base else "H_f"
+    notes = [
+        "The margin is the share by which the torque reported may exceed the one commanded "
+        "until the time-delay estimate diverges."
+    ]
+    if nominal := [check.law for check in checks.checks if check.law in checks.with_model]:
+        notes.append(f"h_bar of {', '.join(nominal)} is {inertia} of the nominal model.")
+    title = f"Eigenvalues of {inertia}^-1 h_bar along the mission"
+    return _table(title, columns, rows, *notes)
+
+
+def _loops(checks: Checked) -> Table:
+    rows = []
+    for check in checks.checks:
+        margin: JudgedCell | None = None
+        if (share := check.loop.margin) is not None:
+            word, tone = ("sound", "good") if check.loop.has_margin else ("small", "bad")
+            word = word if check.loop.is_stable else "none"
+            margin = JudgedCell(f"{share:.2%}", word, tone)
+        radius = _holds(f"{check.loop.radius:.6f}", check.loop.is_stable)
+        rows.append([check.law, radius, margin])
+    notes = ["A small motion of the rigid robot grows by the radius in a tick if it is above 1."]
+    if any(check.loop.margin is not None for check in checks.checks):
+        notes.append("The margin of observers is that of the loop; 100 % is the largest searched.")
+    title = "Stability of the closed loop along the mission"
+    return _table(title, [Column("radius"), Column("margin")], rows, *notes)
+
+
+def _springs(checks: Checked) -> Table:
+    columns = [Column("radius"), Column("largest\nbandwidth"), Column("largest\nh_bar", spec=".3g")]
+    rows = []
+    for check in checks.checks:
+        if flexible := check.flexible:
+            corner = flexible.largest_corner_hz
+            text: str | None = "any" if corner is None else f"{corner:.3g} Hz"
+            text = text if check.law in checks.with_pair else None
+            radius = _holds(f"{flexible.radius:.6f}", flexible.is_stable)
+            rows.append([check.law, radius, text, flexible.largest_h_bar_scale])
+    note = (
+        "An oscillation grows by the radius in a tick if it is above 1. The bandwidth is the "
+        "largest controller.acceleration_filter_hz, and h_bar the largest factor on all of h_bar "
+        "(of an observer: on its inertia), with which it does not; switching terms are not counted."
+    )
+    title = "Stability with the springs of the gears along the mission"
+    return _table(title, columns, rows, note)
+
+
+def _holds(text: str, value: bool) -> JudgedCell:
+    return JudgedCell(text, *(("holds", "good") if value else ("fails", "bad")))
+
+
+def _by_axis(
+    title: str, checks: Checked, columns: Mapping[str, Array | None], prismatic: str, *notes: str
+) -> Table:
+    """Return a column for each law; axes of prismatic joints with the unit of their own."""
+    robot = checks.flight.robot
+    slides = (False, False, False, *robot.is_prismatic[: robot.n])
+    rows = [
+        [
+            f"{name} ({prismatic})" if slides[axis] else name,
+            *(None if values is None else float(values[axis]) for values in columns.values()),
+        ]
+        for axis, name in enumerate(robot.axis_names)
+    ]
+    return _table(title, [Column(law, spec=".3g") for law in columns], rows, *notes)
