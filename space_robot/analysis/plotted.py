@@ -216,7 +216,7 @@ def _deflection(flight: AnalysedLog) -> Quantities:
     joints = [log.joint_names.index(name) for name in known]
     motors = [log.geared_names.index(name) for name in known]
     away = log.motor_positions[:, motors] - log.joint_positions[:, joints]
-    slides = [log.prismatic[joint] for joint in joints]
+    slides = tuple(log.prismatic[joint] for joint in joints)
     yield from _by_unit("gear deflection", known, slides, away, is_shown=True)
 
 
@@ -238,12 +238,15 @@ def _wheels(flight: AnalysedLog) -> Quantities:
     log = flight.log
     if not log.wheel_velocities.shape[1]:
         return
-    names, (momenta, torques) = flight.parts("wheel"), ((), ())
-    is_described = False
+    names, is_described = flight.parts("wheel"), False
+    torques: Sequence[float] = ()
     with suppress(InputError):
         wheels = flight.actuators.wheels
         is_described = True
-        momenta, torques = wheels.values("max_momentum"), wheels.values("max_torque")
+        momenta, torques = (
+            wheels.values("max_momentum").tolist(),
+            wheels.values("max_torque").tolist(),
+        )
         spin = wheels.spin_momenta(log.wheel_velocities)
         yield PlottedQuantity("wheel momentum", "N m s", names, spin, limits=momenta)
     speed = PlottedQuantity("wheel speed", "rad/s", names, log.wheel_velocities)
@@ -354,7 +357,8 @@ def _first(log: FlightLog, columns: Sequence[str]) -> int:
 
 def _names(flight: AnalysedLog, axes: slice | list[int]) -> list[str]:
     """Return the axes of base or joints by their names; those of the base are x, y, z."""
-    return np.array([*XYZ, *flight.log.joint_names])[axes].tolist()
+    names: list[str] = np.array([*XYZ, *flight.log.joint_names])[axes].tolist()
+    return names
 
 
 def _series(

@@ -194,16 +194,14 @@ def _serve(
     from ..processes.interruption import Interrupted
     from ..view.live import serve
 
-    def say(text: str) -> None:
-        click.echo(text, err=True)
-
-    def ready(address: str) -> None:
-        say(f"the scene is at {address}; Ctrl-C ends")
+    events = serve(domain, namespace or "", port, not light, plots)
+    try:
+        address = next(events)
+        click.echo(f"the scene is at {address}; Ctrl-C ends", err=True)
         if opens:
             webbrowser.open(address)
         os.nice(NICENESS)
-
-    try:
-        serve(domain, namespace or "", port, not light, plots, say, ready)
+        for text in events:
+            click.echo(text, err=True)
     except Interrupted:
-        say("ended")
+        click.echo("ended", err=True)
