@@ -51,9 +51,9 @@ RATE_HZ, TELL_EVERY, ROWS = 30, 6, 300
 KEPT, CHUNKS_KEPT = 4, 50
 """Number of kept states per topic, so that all have one of the same tick, and of references."""
 MEASURED = (topics.JOINT_STATES, topics.BASE_STATE)
-REFERENCE = (topics.REFERENCE_JOINTS, topics.REFERENCE_BASE)
+DESIRED_MOTION = (topics.REFERENCE_JOINTS, topics.REFERENCE_BASE)
 HARDWARE = (topics.WHEELS_STATE, topics.THRUSTERS_STATE)
-DESCRIBED = ("base_actuators", "branches", "prismatic_joints")
+DESCRIPTION_KEYS = ("base_actuators", "branches", "prismatic_joints")
 """Keys of the plant's description that quantities depend on."""
 WAITING, OVER = "waiting for a flight", "the flight is over"
 ROOM, TRAIL = 1.3, 0.0035
@@ -119,8 +119,8 @@ class Feed:
         node, self.close = self.monitor.node, self.monitor.close
         self._subscriptions, self._tables = {}, {}
         """Rows of the newest messages, with the stamp of the last one, ns."""
-        for topic in (*topics.TRUTH, *MEASURED, *REFERENCE, *HARDWARE):
-            kept = CHUNKS_KEPT if topic in REFERENCE else KEPT
+        for topic in (*topics.TRUTH, *MEASURED, *DESIRED_MOTION, *HARDWARE):
+            kept = CHUNKS_KEPT if topic in DESIRED_MOTION else KEPT
             self._subscriptions[topic] = RawSubscription(node, topic, group, kept, True)
             self._tables[topic] = deque[tuple[int, Array]](maxlen=kept)
         self._laws = RawSubscription(node, topics.LAW, group)
@@ -139,7 +139,7 @@ class Feed:
         self._codecs = {topic: Codec(described) for topic, described in self._described.items()}
         self.log, self.time = FlightLog.allocate(ROWS, names, ticks), np.full(ROWS, np.nan)
         """The newest states, the last one at the end, and their times, s."""
-        self.log.flight = {key: flight[key] for key in DESCRIBED if key in flight}
+        self.log.flight = {key: flight[key] for key in DESCRIPTION_KEYS if key in flight}
 
     def poll(self) -> bool:
         """Take the messages; return True if there is a new state of base and joints of one tick."""
@@ -160,7 +160,7 @@ class Feed:
         if not all(map(self._tables.get, kinds)):
             return False
         stamp_ns = min(self._tables[kind][-1][0] for kind in kinds)
-        rows = {topic: self._row(topic, stamp_ns) for topic in (*kinds, *REFERENCE)}
+        rows = {topic: self._row(topic, stamp_ns) for topic in (*kinds, *DESIRED_MOTION)}
         stamp_s, before = 1e-9 * stamp_ns, self.time[-1]
         if before - 1.0 < stamp_s <= before or any(rows[kind] is None for kind in kinds):
             return False  # faults may send an old state
