@@ -29,7 +29,7 @@ from .tool_path import ToolPath, leads_tool
 
 Array = NDArray[np.float64]
 
-XYZ = ("x", "y", "z")
+AXES = ("x", "y", "z")
 
 
 class PlottedQuantity(NamedTuple):
@@ -132,11 +132,11 @@ def parse_kinds(text: str) -> tuple[str, ...]:
 def _attitude(flight: AnalysedLog) -> Quantities:
     log = flight.log
     if flight.controls_base:
-        yield PlottedQuantity("attitude error", "deg", XYZ, attitude_angles(log), is_error=True)
+        yield PlottedQuantity("attitude error", "deg", AXES, attitude_angles(log), is_error=True)
         return
     start = _first(log, ("base_position", "quaternion"))
     angles = np.degrees(attitude_drift(log, log.quaternion[start]))
-    yield PlottedQuantity("attitude drift", "deg", XYZ, angles)
+    yield PlottedQuantity("attitude drift", "deg", AXES, angles)
 
 
 @plotted("joints", "errors of the joints")
@@ -169,12 +169,12 @@ def _tool(flight: AnalysedLog) -> Quantities:
 def _base(flight: AnalysedLog) -> Quantities:
     log = flight.log
     start = _first(log, ("base_position", "quaternion"))
-    yield PlottedQuantity("base drift", "m", XYZ, log.base_position - log.base_position[start])
+    yield PlottedQuantity("base drift", "m", AXES, log.base_position - log.base_position[start])
 
 
 @plotted("rates", "angular velocity of the base")
 def _rates(flight: AnalysedLog) -> Quantities:
-    yield PlottedQuantity("base rate", "rad/s", XYZ, flight.log.omega_base, is_shown=False)
+    yield PlottedQuantity("base rate", "rad/s", AXES, flight.log.omega_base, is_shown=False)
 
 
 @plotted("positions", "positions of the joints")
@@ -216,7 +216,7 @@ def _deflection(flight: AnalysedLog) -> Quantities:
     joints = [log.joint_names.index(name) for name in known]
     motors = [log.geared_names.index(name) for name in known]
     away = log.motor_positions[:, motors] - log.joint_positions[:, joints]
-    slides = [log.prismatic[joint] for joint in joints]
+    slides = tuple(log.prismatic[joint] for joint in joints)
     yield from _by_unit("gear deflection", known, slides, away, is_shown=True)
 
 
@@ -238,12 +238,15 @@ def _wheels(flight: AnalysedLog) -> Quantities:
     log = flight.log
     if not log.wheel_velocities.shape[1]:
         return
-    names, (momenta, torques) = flight.parts("wheel"), ((), ())
-    is_described = False
+    names, is_described = flight.parts("wheel"), False
+    torques: Sequence[float] = ()
     with suppress(InputError):
         wheels = flight.actuators.wheels
         is_described = True
-        momenta, torques = wheels.values("max_momentum"), wheels.values("max_torque")
+        momenta, torques = (
+            wheels.values("max_momentum").tolist(),
+            wheels.values("max_torque").tolist(),
+        )
         spin = wheels.spin_momenta(log.wheel_velocities)
         yield PlottedQuantity("wheel momentum", "N m s", names, spin, limits=momenta)
     speed = PlottedQuantity("wheel speed", "rad/s", names, log.wheel_velocities)
@@ -277,7 +280,7 @@ def _thrusters(flight: AnalysedLog) -> Quantities:
     used = 1e3 * log.timebase.period * np.cumsum(flow)[:, np.newaxis]
     yield PlottedQuantity("propellant", "g", ["used"], used, is_shown=False)
     centre = momentum_of(log).centre_of_mass
-    yield PlottedQuantity("robot pushed", "m", XYZ, centre - centre[0], is_shown=False)
+    yield PlottedQuantity("robot pushed", "m", AXES, centre - centre[0], is_shown=False)
 
 
 @plotted(
@@ -289,7 +292,7 @@ def _thrusters(flight: AnalysedLog) -> Quantities:
 def _momentum(flight: AnalysedLog) -> Quantities:
     is_drawn = bool(flight.log.flight.get("base_actuators"))
     for title, values in _parts(momentum_of(flight.log), flight):
-        yield PlottedQuantity(title, "N m s", XYZ, values, is_shown=False, is_drawn=is_drawn)
+        yield PlottedQuantity(title, "N m s", AXES, values, is_shown=False, is_drawn=is_drawn)
 
 
 def _parts(momentum: Momentum, flight: AnalysedLog) -> Iterator[tuple[str, Array]]:
@@ -318,9 +321,9 @@ def _estimates(flight: AnalysedLog) -> Quantities:
         )
         turned[known] = np.degrees((true.inv() * sensed).as_rotvec())
     title = "measured less true"
-    yield PlottedQuantity(f"{title} attitude", "deg", XYZ, turned, is_shown=False)
+    yield PlottedQuantity(f"{title} attitude", "deg", AXES, turned, is_shown=False)
     rate = measured.omega_base - log.omega_base
-    yield PlottedQuantity(f"{title} rate", "rad/s", XYZ, rate, is_shown=False)
+    yield PlottedQuantity(f"{title} rate", "rad/s", AXES, rate, is_shown=False)
     away = measured.joint_positions - log.joint_positions
     slides = log.prismatic[: len(log.joint_names)]
     yield from _by_unit(f"{title} joints", log.joint_names, slides, away)
@@ -342,9 +345,9 @@ def _orbit(flight: AnalysedLog) -> Quantities:
         torques = dict(zip(SOURCES, np.split(log.external_torques, len(SOURCES), 1), strict=True))
     for name, torque in torques.items():
         if np.nan_to_num(torque).any():
-            yield PlottedQuantity(f"{column_label(name)} torque", "N m", XYZ, torque)
+            yield PlottedQuantity(f"{column_label(name)} torque", "N m", AXES, torque)
     if np.nan_to_num(log.magnetic_field).any():
-        yield PlottedQuantity("magnetic field", "T", XYZ, log.magnetic_field, is_drawn=False)
+        yield PlottedQuantity("magnetic field", "T", AXES, log.magnetic_field, is_drawn=False)
 
 
 def _first(log: FlightLog, columns: Sequence[str]) -> int:
@@ -354,7 +357,8 @@ def _first(log: FlightLog, columns: Sequence[str]) -> int:
 
 def _names(flight: AnalysedLog, axes: slice | list[int]) -> list[str]:
     """Return the axes of base or joints by their names; those of the base are x, y, z."""
-    return np.array([*XYZ, *flight.log.joint_names])[axes].tolist()
+    names: list[str] = np.array([*AXES, *flight.log.joint_names])[axes].tolist()
+    return names
 
 
 def _series(

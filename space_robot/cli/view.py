@@ -17,7 +17,7 @@ SUFFIXES = (".html", ".htm")
 NICENESS = 10
 """Niceness of the live viewer, so that it does not delay the graph."""
 LIVE_ONLY = ("domain", "port")
-ALWAYS = ("live", "opens", "light", "namespace", "plots")
+BOTH_WAYS = ("live", "opens", "light", "namespace", "plots")
 
 
 class PlotsOption(click.Option):
@@ -28,11 +28,13 @@ class PlotsOption(click.Option):
         from ..analysis.plotted import KINDS  # slow
 
         names = ", ".join(KINDS)
-        self.help = f"Shown first, of {names}; others can be chosen on the page [default: {USUAL}]."
+        self.help = (
+            f"Shown first, of {names}; others can be chosen on the page [default: {USUAL_PLOTS}]."
+        )
         return super().get_help_record(ctx)
 
 
-USUAL = "errors, drift, torques, actuators"
+USUAL_PLOTS = "errors, drift, torques, actuators"
 
 
 @click.command()
@@ -67,7 +69,7 @@ USUAL = "errors, drift, torques, actuators"
     cls=PlotsOption,
     default="",
     metavar="KIND,...",
-    help=f"Shown first [default: {USUAL}].",
+    help=f"Shown first [default: {USUAL_PLOTS}].",
 )
 @click.option("--light", is_flag=True, help="Dark on white, to print.")
 @REMAP
@@ -174,7 +176,7 @@ def _check_options(context: click.Context, live: bool, bags: tuple[Path, ...]) -
     for option in context.command.params:
         name = option.name or ""
         is_typed = context.get_parameter_source(name) is ParameterSource.COMMANDLINE
-        if is_typed and name not in ("bags", *ALWAYS) and (name in LIVE_ONLY) != live:
+        if is_typed and name not in ("bags", *BOTH_WAYS) and (name in LIVE_ONLY) != live:
             other = "recorded flights" if live else "--live"
             raise InputError(f"{option.opts[0]} is for {other} only")
 
@@ -194,16 +196,14 @@ def _serve(
     from ..processes.interruption import Interrupted
     from ..view.live import serve
 
-    def say(text: str) -> None:
-        click.echo(text, err=True)
-
-    def ready(address: str) -> None:
-        say(f"the scene is at {address}; Ctrl-C ends")
+    events = serve(domain, namespace or "", port, not light, plots)
+    try:
+        address = next(events)
+        click.echo(f"the scene is at {address}; Ctrl-C ends", err=True)
         if opens:
             webbrowser.open(address)
         os.nice(NICENESS)
-
-    try:
-        serve(domain, namespace or "", port, not light, plots, say, ready)
+        for text in events:
+            click.echo(text, err=True)
     except Interrupted:
-        say("ended")
+        click.echo("ended", err=True)

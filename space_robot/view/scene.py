@@ -185,13 +185,11 @@ def add_shape(
     more = look.growth
     if not look.tint and not look.growth and (parts := parts_of(shape)):
         pose["opacity"] = look.opacity if look.opacity < 1.0 else None
-        nodes = []
+        nodes: list[SceneNodeHandle] = []
         for part in parts:
             name = f"{path}/{part.name}" if nodes else path
-            own_colour = tuple(round(255 * value) for value in part.colour[:3])
-            nodes.append(
-                scene.add_mesh_simple(name, *part.mesh, color=own_colour, flat_shading=True, **pose)
-            )
+            pose["color"] = tuple(round(255 * value) for value in part.colour[:3])
+            nodes.append(scene.add_mesh_simple(name, *part.mesh, flat_shading=True, **pose))
             pose = {"opacity": pose["opacity"]}  # the others are on the first one
         return nodes[0]
     if mesh is not None:

@@ -304,8 +304,6 @@ def panel(size: Array) -> tuple[Mesh, Mesh]:
 
 def wheel(radius: float, width: float) -> Mesh:
     """Return a wheel about z, m: a rim, a hub and spokes, which make its turning visible."""
-    from trimesh.transformations import rotation_matrix
-
     rim, hub = (
         _revolved([(inner, -half), (outer, -half), (outer, half), (inner, half), (inner, -half)])
         for inner, outer, half in (
@@ -314,10 +312,12 @@ def wheel(radius: float, width: float) -> Mesh:
         )
     )
     spokes = []
-    for k in range(SPOKES):
+    for angle in 2.0 * np.pi * np.arange(SPOKES) / SPOKES:
         size = np.array([0.62 * radius, 0.16 * radius, 0.5 * width])
         spoke = _box(size, np.array([0.48 * radius, 0.0, 0.0]))
-        spokes.append(spoke.apply_transform(rotation_matrix(2.0 * np.pi * k / SPOKES, (0, 0, 1))))
+        turn = np.eye(4)
+        turn[:2, :2] = [[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]]
+        spokes.append(spoke.apply_transform(turn))
     return _joined([rim, hub, *spokes])
 
 
