@@ -47,13 +47,13 @@ def check_flights() -> CheckedItem:
 def _examine_machine(clock_s: float | None) -> Iterator[CheckedItem]:
     from space_robot_msgs_py.compiled.cache import cache_directory
 
-    from ..flight.compilation import MARK, mark_of
+    from ..flight.compilation import MARK, mark_file
     from .clock import DURATION_S, check_deadlines, check_scheduling, measure_lateness
     from .ros import check_ros
     from .storage import check_disk, check_kernels, check_memory
     from .tools import check_tools
 
-    yield check_kernels(cache_directory(), mark_of(MARK))
+    yield check_kernels(cache_directory(), mark_file(MARK))
     yield check_scheduling()
     yield check_memory()
     yield check_disk(Path.cwd())

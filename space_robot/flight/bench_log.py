@@ -90,7 +90,7 @@ class BenchLog:
         Raises:
             InputError: there is no room for the log.
         """
-        self.flight = flight_of(flight, history)
+        self.flight = flown_flight(flight, history)
         """The flight that was flown, with its plant at the end: of the seed that was flown, and
         without a law if the law was never asked."""
         self.log = self._fly(history, error)
@@ -145,7 +145,7 @@ def law_at(law: ControlLaw, swaps: Sequence[tuple[int, ControlLaw]], tick: int) 
     return law
 
 
-def flight_of(flight: Flight, history: BenchHistory) -> Flight:
+def flown_flight(flight: Flight, history: BenchHistory) -> Flight:
     """Return the flight that describes what was flown on a bench, with a plant at tick 0.
 
     It has the seed of the history, and no law if none was ever asked.

@@ -92,7 +92,9 @@ def empty_log(
     The reference alone is known; it may have been computed. ``allocate`` makes the columns that the
     flight fills. ``is_brief``: with what metrics need only, see `Flight.brief`.
     """
-    log = columns_of(flight, (flight.ticks if stop is None else stop) - start, allocate, is_brief)
+    log = allocate_columns(
+        flight, (flight.ticks if stop is None else stop) - start, allocate, is_brief
+    )
     log.first_tick, log.scenario = start, flight.scenario
     log.flight = flight.brief if is_brief else flight.description
     log.lost = {topic.full_name: 0 for topic in topics.ALL}
@@ -101,7 +103,7 @@ def empty_log(
     return log
 
 
-def columns_of(
+def allocate_columns(
     flight: Flight,
     ticks: int,
     allocate: Callable[[tuple[int, ...]], Array] = of_nan,
