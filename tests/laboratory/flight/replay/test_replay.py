@@ -22,7 +22,7 @@ from rosbags.rosbag2 import StoragePlugin, Writer
 
 from space_robot.flight.replay.choice import ControllerChoice
 from space_robot.flight.replay.recording import COMPARED, Recording
-from space_robot.flight.replay.run import ReplayOptions, replay
+from space_robot.flight.replay.run import ReferenceStream, ReplayOptions, replay
 from space_robot_control.controller.gains import build_laws, split_gains
 from space_robot_control.controller.settings import ControllerNodeSettings
 from space_robot_msgs_py import topics
@@ -76,6 +76,18 @@ def test_states_and_references_come_as_recorded(bag: Path, tmp_path: Path) -> No
     for topic in (topics.REFERENCE_JOINTS, topics.REFERENCE_BASE):
         for start, ticks in ((0, [0, 100, 200, 300]), (250, [200, 300]), (10_000, [300])):
             assert [tick for tick, _ in recording.references(topic, start)] == ticks
+
+
+def test_references_are_read_as_late_as_in_flight() -> None:
+    """A ``goto`` at tick 150 overwrites what had been sent before it for later ticks."""
+    sent = ((tick, str(tick).encode()) for tick in (0, 100, 200, 300, 150, 250, 350))
+    read: list[int] = []
+    stream = ReferenceStream(
+        sent, lambda data: (int(data), np.empty(0)), lambda tick, _: read.append(tick)
+    )
+    for tick, expected in ((149, [0, 100]), (150, [0, 100, 200, 300, 150])):
+        stream.feed(tick)
+        assert read == expected
 
 
 def test_what_the_recorder_missed_is_known(bag: Path, tmp_path: Path) -> None:
