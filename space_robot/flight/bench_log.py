@@ -80,16 +80,7 @@ class BenchLog:
     """A flight and its log as `space_robot.flight.simulate.simulate` makes it."""
 
     def __init__(self, flight: Flight, history: BenchHistory, error: FlightError | None) -> None:
-        """Fly the commands of a history again.
-
-        Args:
-            flight: that was put on the bench.
-            history: of the ticks flown.
-            error: that ended the flight; None: it is complete, or goes on.
-
-        Raises:
-            InputError: there is no room for the log.
-        """
+        """Fly the commands of a history again; ``error``: that ended the flight, if one did."""
         self.flight = flown_flight(flight, history)
         """The flight that was flown, with its plant at the end: of the seed that was flown, and
         without a law if the law was never asked."""

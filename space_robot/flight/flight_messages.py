@@ -164,16 +164,7 @@ def recording(flight: Flight, bag: Path | None) -> Iterator[Messages | None]:
 
 
 def record(flight: Flight, log: FlightLog, bag: Path) -> None:
-    """Write a flown flight into a bag, with the messages that `simulate` would have written.
-
-    Args:
-        flight: that was flown.
-        log: of all its ticks, in memory.
-        bag: folder to write.
-
-    Raises:
-        InputError: the bag cannot be written.
-    """
+    """Write a flown flight into a bag, with the messages that `simulate` would have written."""
     answered = log.ticks - log.unanswered
     with recording(flight, bag) as messages:
         assert messages
@@ -197,11 +188,7 @@ class MessageLoop:
     ) -> None:
         """Begin at the flight's first tick.
 
-        Args:
-            flight: to be flown.
-            record: called with every message.
-            update_true_state: called with each true state that is not the measured one.
-            supervisor: of the flight's controller, to answer (None: `Flight.supervisor`).
+        ``update_true_state`` gets each true state that is not the measured one.
         """
         robot, settings = flight.robot, flight.plant_settings
         names = flight.plant.names

@@ -25,11 +25,7 @@ MAPPED_FROM = 2**30
 
 
 def flight_log(flight: Flight, ticks: int | None = None) -> FlightLog:
-    """Return the log of the first ``ticks`` (None: all) before they are flown, see `empty_log`.
-
-    Raises:
-        InputError: there is no room for its files.
-    """
+    """Return the log of the first ``ticks`` (None: all) before they are flown, see `empty_log`."""
     ticks = flight.ticks if ticks is None else ticks
     if (size := ticks * row_bytes(flight)) < MAPPED_FROM:
         return empty_log(flight, 0, ticks)
@@ -45,11 +41,7 @@ def flight_log(flight: Flight, ticks: int | None = None) -> FlightLog:
 
 
 def new_array(count: int, what: str) -> Array:
-    """Return an array of ``count`` numbers, in a file if it is large.
-
-    Raises:
-        InputError: there is no room for the file; says so of ``what``.
-    """
+    """Return an array of ``count`` numbers, in a file if it is large."""
     if 8 * count < MAPPED_FROM:
         return np.empty(count)
     check_room(8 * count, what)

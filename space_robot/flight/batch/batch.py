@@ -111,11 +111,7 @@ class FlightBatch:
     """Flights that fly together, see `batch_key`; plants and controllers are flown on."""
 
     def __init__(self, flights: Sequence[Flight]) -> None:
-        """Put up to eight checked flights into lanes, from where their plants stand.
-
-        Raises:
-            InputError: the law has no kernel that can be compiled in lanes.
-        """
+        """Put up to eight checked flights into lanes, from where their plants stand."""
         self.flights = list(flights)
         first = self.flights[0]
         self._law = LawInLanes([flight.controller.law for flight in flights], first.robot.n)

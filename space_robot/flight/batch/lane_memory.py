@@ -113,11 +113,7 @@ class LawInLanes:
     """Gains and memory of the law in force, of up to eight flights."""
 
     def __init__(self, laws: Sequence[ControlLaw], n: int) -> None:
-        """Copy gains and memory of ``laws`` of one class for a robot of ``n`` joints.
-
-        Raises:
-            InputError: the kernel cannot be compiled in lanes.
-        """
+        """Copy gains and memory of ``laws`` of one class for a robot of ``n`` joints."""
         first = laws[0]
         assert isinstance(first, CompiledLaw)
         gains, self._memory = first.gains_type.lanes(n), first.memory_type.lanes(n)

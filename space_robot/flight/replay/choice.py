@@ -59,9 +59,6 @@ class ControllerChoice:
             trust: whether modules and files that the description names may be opened.
             laws: in force in flight, by rising tick: of a bag without a description the first one
                 is the law that flew, with its gains.
-
-        Raises:
-            InputError: something recorded or given does not exist here, or does not fit.
         """
         if laws and "controller" not in flight:
             gains_used = {name: list(values) for name, values in laws[0].gains.items()}
