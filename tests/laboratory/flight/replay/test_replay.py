@@ -18,7 +18,6 @@ from bags import entries_of, messages_in, rosbags_bag
 from flights import planned, simulated, space_robot_here
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from rosbags.rosbag2 import StoragePlugin, Writer
 
 from space_robot.flight.replay.choice import ControllerChoice
 from space_robot.flight.replay.recording import COMPARED, Recording
@@ -32,7 +31,6 @@ from space_robot_msgs_py.bag.recorder import BagRecorder
 from space_robot_msgs_py.config.files import named_file
 from space_robot_msgs_py.config.validation import read_yaml
 from space_robot_msgs_py.errors import InputError
-from space_robot_msgs_py.wire.definitions import jazzy
 
 STATES = (topics.JOINT_STATES, topics.BASE_STATE)
 TICKS = 400
@@ -98,24 +96,6 @@ def test_what_the_recorder_missed_is_known(bag: Path, tmp_path: Path) -> None:
     assert late.lost_commands == 30
     with pytest.raises(InputError, match="no messages on /reference/joints"):
         copied(bag, tmp_path / "bag", lambda name, number: "reference" not in name)
-
-
-def test_topics_of_other_names_are_remapped(bag: Path, tmp_path: Path) -> None:
-    with Writer(tmp_path / "bag", version=9, storage_plugin=StoragePlugin.MCAP) as writer:
-        store: dict[str, Any] = {"typestore": jazzy()}
-        connections = {
-            topic.full_name: writer.add_connection(f"/arm{topic.full_name}_1", topic.type, **store)
-            for topic in topics.ALL
-        }
-        for number, (name, data) in enumerate(messages_in(bag)):
-            writer.write(connections[name], number, data)
-    with pytest.raises(InputError, match=r"on /joint_states \(it has /arm/command_1, /arm/j"):
-        Recording(tmp_path / "bag")
-    remapped = Recording(tmp_path / "bag", {f"/arm{name}_1": name for name in topics.BY_NAME})
-    here = Recording(bag)
-    assert list(remapped.states(STATES)) == list(here.states(STATES))
-    axes = planned().robot.axis_names
-    np.testing.assert_array_equal(remapped.commands(axes).torque, here.commands(axes).torque)
 
 
 def cut_bag(bag: Path, part: float) -> Path:
