@@ -99,7 +99,7 @@ def cli() -> None:
       space-robot gains tune -o my_gains            a gain set for a robot and a mission
       space-robot analyze flights/<bag>...          metrics of recorded flights
       space-robot view flights/<bag>                the robot in 3-D with plots, as one page
-      space-robot replay flights/<bag>              recorded states to a live controller
+      space-robot replay flights/<bag>              recorded states answered anew
       space-robot sim step --ticks 10               a running graph, paused and stepped
       space-robot campaign run sensor_grades        laws over grades of sensors
       space-robot campaign run FILE --runs 1000     dispersed flights: verdicts with confidence

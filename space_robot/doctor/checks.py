@@ -170,9 +170,9 @@ def check_kernels() -> CheckedItem:
     """Check the folder of compiled kernels, and if those of this version are there."""
     from space_robot_msgs_py.compiled.cache import cache_directory
 
-    from ..flight.compilation import MARK, mark_of
+    from ..flight.compilation import MARK, mark_file
 
-    folder, is_compiled = cache_directory(), mark_of(MARK).exists()
+    folder, is_compiled = cache_directory(), mark_file(MARK).exists()
     values = {"folder": str(folder), "is_compiled": is_compiled}
     text, advice = f"compiled for this version, in {folder}", ""
     try:

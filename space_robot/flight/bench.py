@@ -104,7 +104,7 @@ class FlightBench(RecordOwner):
         self.axes = len(self.names.axes)
         """m = n+3."""
         self._shape = (len(self.names.commanded),)
-        self._given = Command(0, np.zeros(self._shape))
+        self._command = Command(0, np.zeros(self._shape))
         self._records = record
         self._desired: Block = np.empty(0, Reference.dtype(flight.robot.n))
         self._first = 0
@@ -153,7 +153,7 @@ class FlightBench(RecordOwner):
             raise InputError(f"the flight is over ({self.outcome}): reset or restore the bench")
         plant = self._plant
         try:
-            command = self.command() if torque is None else self._command_of(torque)
+            command = self.command() if torque is None else self._resolve_command(torque)
             if (history := self._history) is not None:
                 if self._answered == plant.state.tick:
                     history.add(command.torque, self.controller.telemetry())
@@ -186,7 +186,7 @@ class FlightBench(RecordOwner):
                 controller.law = law
             elif tick and tick != self._answered + 1:
                 controller.engage()
-            self._look_up(tick)
+            self._set_reference(tick)
             controller.update(state, self._reference_block)
             self._answered = tick
         return controller.last_command
@@ -269,7 +269,7 @@ class FlightBench(RecordOwner):
     @property
     def reference(self) -> Reference:
         """The desired motion at this tick; overwritten."""
-        self._look_up(self._plant.state.tick)
+        self._set_reference(self._plant.state.tick)
         return self._reference
 
     @property
@@ -299,9 +299,9 @@ class FlightBench(RecordOwner):
     def _end(self, ending: Ending) -> None:
         self._ending, self.done = ending, True
 
-    def _command_of(self, torque: ArrayLike) -> Command:
+    def _resolve_command(self, torque: ArrayLike) -> Command:
         """Return the command for numbers given by the user."""
-        numbers, torques = as_numbers(torque, "torque"), self._given
+        numbers, torques = as_numbers(torque, "torque"), self._command
         if numbers.shape == self._shape:
             torques.torque[:] = numbers
             return torques
@@ -312,7 +312,7 @@ class FlightBench(RecordOwner):
             )
         return self.controller.allocate_torque(self._plant.state, numbers)
 
-    def _look_up(self, tick: int) -> None:
+    def _set_reference(self, tick: int) -> None:
         """Write the reference of a tick into its block."""
         row = tick - self._first
         if not 0 <= row < len(self._desired):

@@ -80,17 +80,8 @@ class BenchLog:
     """A flight and its log as `space_robot.flight.simulate.simulate` makes it."""
 
     def __init__(self, flight: Flight, history: BenchHistory, error: FlightError | None) -> None:
-        """Fly the commands of a history again.
-
-        Args:
-            flight: that was put on the bench.
-            history: of the ticks flown.
-            error: that ended the flight; None: it is complete, or goes on.
-
-        Raises:
-            InputError: there is no room for the log.
-        """
-        self.flight = flight_of(flight, history)
+        """Fly the commands of a history again; ``error``: that ended the flight, if one did."""
+        self.flight = flown_flight(flight, history)
         """The flight that was flown, with its plant at the end: of the seed that was flown, and
         without a law if the law was never asked."""
         self.log = self._fly(history, error)
@@ -145,7 +136,7 @@ def law_at(law: ControlLaw, swaps: Sequence[tuple[int, ControlLaw]], tick: int) 
     return law
 
 
-def flight_of(flight: Flight, history: BenchHistory) -> Flight:
+def flown_flight(flight: Flight, history: BenchHistory) -> Flight:
     """Return the flight that describes what was flown on a bench, with a plant at tick 0.
 
     It has the seed of the history, and no law if none was ever asked.

@@ -26,7 +26,7 @@ BATCH = 8192
 """Ticks at a time; this bounds the memory."""
 PARALLEL = 1e-9
 """Share of two torques' product below which they are along one line."""
-FLAT = 1e-6
+FLATNESS = 1e-6
 """Share of the largest torque that counts as none."""
 
 
@@ -205,12 +205,12 @@ def _half_spaces(torques: Array, low: Array, high: Array) -> Array:
 
     All torques ``sum x_i torques_i`` with ``low <= x <= high`` are a zonotope, whose faces are
     spanned by two of the rows (A, 3). Of a flat one, as of couples about one axis, the thickness
-    is `FLAT` of the largest torque: whatever is out of its plane is too much.
+    is `FLATNESS` of the largest torque: whatever is out of its plane is too much.
     """
     _, spread, axes = np.linalg.svd(torques)
     missing = axes[np.count_nonzero(spread > PARALLEL * spread[0]) :] * (spread[0] or 1.0)
     torques = np.vstack([torques, missing])
-    thin = np.full(len(missing), FLAT)
+    thin = np.full(len(missing), FLATNESS)
     low, high = np.append(low, -thin), np.append(high, thin)
     sizes = np.linalg.norm(torques, axis=1)
     turning = torques[sizes > PARALLEL * sizes.max()]

@@ -33,7 +33,7 @@ _config: Any = numba.config
 MARK, ALLOCATION_MARK = "complete", "allocation"
 
 
-def mark_of(what: str) -> Path:
+def mark_file(what: str) -> Path:
     """Return the file whose existence says that kernels are compiled for this kind of processor."""
     processor = _config.CPU_NAME or llvmlite.binding.get_host_cpu_name()
     return cache_directory() / f"{what}.{processor}"
@@ -46,7 +46,7 @@ def compile_kernels(with_allocation: bool = False) -> None:
     is for bases whose actuators are hardware.
     """
     _compile_flights()
-    mark = mark_of(ALLOCATION_MARK)
+    mark = mark_file(ALLOCATION_MARK)
     if with_allocation and not mark.exists():
         with compiling("the allocation", allocate):
             allocation_code(is_used=True)
@@ -58,7 +58,7 @@ def _compile_flights() -> None:
 
     The controller's kernels are compiled by a second process while this one compiles the plant's.
     """
-    mark = mark_of(MARK)
+    mark = mark_file(MARK)
     if mark.exists():
         return
     from .simulate import simulate  # nodes load kernels without it
@@ -101,7 +101,7 @@ def compiling(what: str, *kernels: Any, again: bool = False) -> Iterator[None]:
 
 def load_kernels() -> None:
     """Load the kernels used by nodes from the cache, if it exists."""
-    if mark_of(MARK).exists():
+    if mark_file(MARK).exists():
         flight = Flight(resolve(Scenario()))
         _step_plant(flight)
         _answer_and_exchange(flight)

@@ -37,8 +37,8 @@ Array = NDArray[np.float64]
 Record = Callable[[topics.Topic, bytes], object]
 LARGE_BAG = 500e6
 """Bytes of a bag that a user is told before it is written."""
-SMALLEST_TICK = 200
-"""Bytes of a tick below any flight's: shorter flights are not measured."""
+MOST_TICK_BYTES = 5000
+"""Above those of any flight's tick: bags of fewer ticks are not measured."""
 SAMPLE_TICKS, RECORD_BYTES = 1000, 31
 """Ticks whose messages are counted, and bytes of a message's header in MCAP."""
 COMPRESSED = {"none": 1.0, "lz4": 0.48, "zstd": 0.4}
@@ -127,7 +127,7 @@ class Messages:
 
 def bag_remark(flight: Flight) -> str:
     """Return what a large bag of a flight will need, in a line; empty: it is a small one."""
-    if flight.ticks * SMALLEST_TICK < LARGE_BAG or (size := bag_size(flight)) < LARGE_BAG:
+    if flight.ticks * MOST_TICK_BYTES < LARGE_BAG or (size := bag_size(flight)) < LARGE_BAG:
         return ""
     return f"the bag of {flight.ticks * flight.period:g} s will need about {size / 1e9:.1f} GB"
 
@@ -164,16 +164,7 @@ def recording(flight: Flight, bag: Path | None) -> Iterator[Messages | None]:
 
 
 def record(flight: Flight, log: FlightLog, bag: Path) -> None:
-    """Write a flown flight into a bag, with the messages that `simulate` would have written.
-
-    Args:
-        flight: that was flown.
-        log: of all its ticks, in memory.
-        bag: folder to write.
-
-    Raises:
-        InputError: the bag cannot be written.
-    """
+    """Write a flown flight into a bag, with the messages that `simulate` would have written."""
     answered = log.ticks - log.unanswered
     with recording(flight, bag) as messages:
         assert messages
@@ -197,11 +188,7 @@ class MessageLoop:
     ) -> None:
         """Begin at the flight's first tick.
 
-        Args:
-            flight: to be flown.
-            record: called with every message.
-            update_true_state: called with each true state that is not the measured one.
-            supervisor: of the flight's controller, to answer (None: `Flight.supervisor`).
+        ``update_true_state`` gets each true state that is not the measured one.
         """
         robot, settings = flight.robot, flight.plant_settings
         names = flight.plant.names

@@ -25,11 +25,7 @@ MAPPED_FROM = 2**30
 
 
 def flight_log(flight: Flight, ticks: int | None = None) -> FlightLog:
-    """Return the log of the first ``ticks`` (None: all) before they are flown, see `empty_log`.
-
-    Raises:
-        InputError: there is no room for its files.
-    """
+    """Return the log of the first ``ticks`` (None: all) before they are flown, see `empty_log`."""
     ticks = flight.ticks if ticks is None else ticks
     if (size := ticks * row_bytes(flight)) < MAPPED_FROM:
         return empty_log(flight, 0, ticks)
@@ -45,11 +41,7 @@ def flight_log(flight: Flight, ticks: int | None = None) -> FlightLog:
 
 
 def new_array(count: int, what: str) -> Array:
-    """Return an array of ``count`` numbers, in a file if it is large.
-
-    Raises:
-        InputError: there is no room for the file; says so of ``what``.
-    """
+    """Return an array of ``count`` numbers, in a file if it is large."""
     if 8 * count < MAPPED_FROM:
         return np.empty(count)
     check_room(8 * count, what)
@@ -92,7 +84,9 @@ def empty_log(
     The reference alone is known; it may have been computed. ``allocate`` makes the columns that the
     flight fills. ``is_brief``: with what metrics need only, see `Flight.brief`.
     """
-    log = columns_of(flight, (flight.ticks if stop is None else stop) - start, allocate, is_brief)
+    log = allocate_columns(
+        flight, (flight.ticks if stop is None else stop) - start, allocate, is_brief
+    )
     log.first_tick, log.scenario = start, flight.scenario
     log.flight = flight.brief if is_brief else flight.description
     log.lost = {topic.full_name: 0 for topic in topics.ALL}
@@ -101,7 +95,7 @@ def empty_log(
     return log
 
 
-def columns_of(
+def allocate_columns(
     flight: Flight,
     ticks: int,
     allocate: Callable[[tuple[int, ...]], Array] = of_nan,

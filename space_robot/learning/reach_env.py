@@ -31,7 +31,7 @@ except ImportError:
     raise ImportError(f"gymnasium is not installed: {install_command('gym')}") from None
 
 from ..flight.batch.lane_loop import InLanes
-from ..flight.batch.lane_memory import in_lanes, numbers_of
+from ..flight.batch.lane_memory import in_lanes, record_numbers
 from .episodes import ReachTask, reach_task
 from .reach import LARGEST, Reach, observe_start, step_alone, step_in_lanes
 
@@ -234,7 +234,7 @@ class ReachVectorEnv(VectorEnv[Array, Array, Array]):
             observe_start(plant, reach)
             group, lane = divmod(int(k), WIDTH)
             self._states[group, :, lane] = plant["x"][0, : self._states.shape[1]]
-            numbers_of(self._reaches[group : group + 1])[:, lane] = reach.view(np.float64)
+            record_numbers(self._reaches[group : group + 1])[:, lane] = reach.view(np.float64)
             self._observations[k] = reach["observation"][0]
 
 

@@ -22,7 +22,7 @@ from ..ending import Ending
 from ..flown_log import ended_early, note_assumed_errors
 from ..plan import Flight
 from .lane_loop import fly_lanes, measure_lanes
-from .lane_memory import LawInLanes, LogsInLanes, begin_tick, copy_back, copy_command, memory_of
+from .lane_memory import LawInLanes, LogsInLanes, begin_tick, copy_back, copy_command, lane_memory
 
 
 def batch_obstacle(flight: Flight) -> str:
@@ -33,13 +33,13 @@ def batch_obstacle(flight: Flight) -> str:
         return "the flight code in C answers"
     for law in (flight.law, *(law for _, law in flight.swaps)):
         kind: Any = type(law)  # classes are hashable
-        if why := _of_law(kind):
+        if why := _law_obstacle(kind):
             return why
     return ""
 
 
 @cache
-def _of_law(law: Any) -> str:
+def _law_obstacle(law: Any) -> str:
     """Return why a class of laws flies alone; one that cannot be compiled is tried once."""
     if not issubclass(law, CompiledLaw):
         return f"law {law.name!r} is plain Python"
@@ -111,15 +111,11 @@ class FlightBatch:
     """Flights that fly together, see `batch_key`; plants and controllers are flown on."""
 
     def __init__(self, flights: Sequence[Flight]) -> None:
-        """Put up to eight checked flights into lanes, from where their plants stand.
-
-        Raises:
-            InputError: the law has no kernel that can be compiled in lanes.
-        """
+        """Put up to eight checked flights into lanes, from where their plants stand."""
         self.flights = list(flights)
         first = self.flights[0]
         self._law = LawInLanes([flight.controller.law for flight in flights], first.robot.n)
-        self._memory = memory_of(self.flights)
+        self._memory = lane_memory(self.flights)
         self._choices = [LawChoice(flight.law, flight.swaps) for flight in flights]
 
     @property

@@ -19,7 +19,7 @@ from space_robot_sim.plant.lanes import advance_lanes
 from space_robot_sim.plant.tick import PlantMemory
 
 from ...processes.child_process import child_process
-from ..compilation import compile_kernels, compiling, laws_with_gains, mark_of
+from ..compilation import compile_kernels, compiling, laws_with_gains, mark_file
 from ..plan import Flight, Scenario, resolve
 from .batch import FlightBatch
 from .bench_loop import fly_benches
@@ -38,7 +38,7 @@ def compile_all() -> None:
 def compile_lanes() -> None:
     """Compile the kernels of flights that fly together, once an installation."""
     compile_kernels()
-    mark = mark_of(MARK)
+    mark = mark_file(MARK)
     if mark.exists():
         return
     own = [law.kernel for law in laws_with_gains().values() if issubclass(law, CompiledLaw)]

@@ -18,14 +18,14 @@ from space_robot_msgs_py.samples import ALL_FIELDS, Reference, ReferenceChunk, S
 from space_robot_sim.plant.plant import Plant
 from space_robot_sim.plant.tick import PlantMemory
 
-from ..flown_log import columns_of, empty_log, new_array
+from ..flown_log import allocate_columns, empty_log, new_array
 from ..plan import Flight
 from .lane_loop import InLanes, LaneLog, LaneMemory, References, take_out
 
 Array = NDArray[np.float64]
 
 
-def numbers_of(block: Block) -> Array:
+def record_numbers(block: Block) -> Array:
     """Return a block's numbers: (N, 8) of one in lanes, (k, N) of k records."""
     numbers: Array = block.view(np.float64)
     return numbers.reshape(-1, WIDTH) if len(block) == 1 else numbers.reshape(len(block), -1)
@@ -34,7 +34,7 @@ def numbers_of(block: Block) -> Array:
 def in_lanes(record: type[Record], n: int) -> InLanes:
     """Return memory for eight records of a robot of ``n`` joints."""
     block, alone = record.lanes(n), np.zeros(WIDTH, record.dtype(n))
-    return InLanes(block, numbers_of(block), alone, numbers_of(alone))
+    return InLanes(block, record_numbers(block), alone, record_numbers(alone))
 
 
 def put_in(records: InLanes, lane: int) -> None:
@@ -70,7 +70,7 @@ def begin_tick(plant: Plant, plants: InLanes, lane: int, tick: int) -> None:
     put_in(plants, lane)
 
 
-def memory_of(flights: Sequence[Flight]) -> LaneMemory:
+def lane_memory(flights: Sequence[Flight]) -> LaneMemory:
     """Return the memory of up to eight flights; a lane without a flight does not fly."""
     n = flights[0].robot.n
     plants, controllers = in_lanes(PlantMemory, n), in_lanes(ControllerMemory, n)
@@ -86,7 +86,7 @@ def memory_of(flights: Sequence[Flight]) -> LaneMemory:
         controllers,
         plants.block["measured"],
         reference,
-        numbers_of(reference),
+        record_numbers(reference),
         delay_buffers([flight.plant for flight in flights]),
         torque,
         flies,
@@ -113,18 +113,14 @@ class LawInLanes:
     """Gains and memory of the law in force, of up to eight flights."""
 
     def __init__(self, laws: Sequence[ControlLaw], n: int) -> None:
-        """Copy gains and memory of ``laws`` of one class for a robot of ``n`` joints.
-
-        Raises:
-            InputError: the kernel cannot be compiled in lanes.
-        """
+        """Copy gains and memory of ``laws`` of one class for a robot of ``n`` joints."""
         first = laws[0]
         assert isinstance(first, CompiledLaw)
         gains, self._memory = first.gains_type.lanes(n), first.memory_type.lanes(n)
         of_lanes = [*laws, *[first] * (WIDTH - len(laws))]
         for lane, law in enumerate(of_lanes):
-            numbers_of(gains)[:, lane] = law.gains_block.view(np.float64)
-            numbers_of(self._memory)[:, lane] = law.memory_block.view(np.float64)
+            record_numbers(gains)[:, lane] = law.gains_block.view(np.float64)
+            record_numbers(self._memory)[:, lane] = law.memory_block.view(np.float64)
         self._laws = laws
         self.code = LawCode(
             first.function(WIDTH),
@@ -139,10 +135,7 @@ class LawInLanes:
 
     def copy_back(self, lane: int) -> None:
         """Copy the memory of one lane into its law."""
-        self._laws[lane].memory_block.view(np.float64)[:] = numbers_of(self._memory)[:, lane]
-
-
-Array = NDArray[np.float64]
+        self._laws[lane].memory_block.view(np.float64)[:] = record_numbers(self._memory)[:, lane]
 
 
 class LogsInLanes:
@@ -197,7 +190,7 @@ def _columns(flight: Flight, ticks: int, is_brief: bool) -> list[Array]:
         shapes.append(shape[1:])
         return np.empty(shape)
 
-    columns_of(flight, 1, asked, is_brief)
+    allocate_columns(flight, 1, asked, is_brief)
     counts = [WIDTH * ticks * int(np.prod(shape, dtype=int)) for shape in shapes]
     room = new_array(sum(counts), f"{WIDTH} flights of {ticks * flight.period:g} s")
     parts = np.split(room, np.cumsum(counts)[:-1])

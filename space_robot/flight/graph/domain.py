@@ -47,11 +47,6 @@ def ros_domain(
 
     Others may have another ``namespace`` of a domain that the user names. Nodes with the names
     ``welcome`` may be there.
-
-    Raises:
-        InputError: that namespace of the domain has nodes of this project, or a command that has
-            started some.
-        FlightError: none is free.
     """
     number = domain_asked_for(number)
     domain, lock = (
@@ -160,15 +155,8 @@ def refuse_publishers(
 ) -> None:
     """Wait until all earlier nodes are discovered; refuse those that publish a flight's topics.
 
-    Args:
-        node: an rclpy node in the domain.
-        joined_at: when it was made, by the monotonic clock: discovery began then.
-        names: of the flight's own nodes in its namespace.
-        of_others: topics that the user's nodes publish.
-        check: called while waiting; raises to give up.
-
-    Raises:
-        InputError: another node publishes one of the topics.
+    ``joined_at``: when ``node`` was made, by the monotonic clock; ``names``: of the flight's nodes;
+    ``of_others``: topics that the user's nodes publish.
     """
     from space_robot_msgs_py.ros.endpoints import full_name_of
 

@@ -16,7 +16,7 @@ from ...scenario.faults import NODE_OF
 from ..plan import Flight
 from .domain import refuse_publishers
 from .monitor import Event, Monitor
-from .node_names import PLANT, OwnNodes, started_nodes, topics_of, wait_for
+from .node_names import PLANT, OwnNodes, published_topics, started_nodes, wait_for
 from .node_services import change_state
 from .processes import Command, Graph, node_command
 from .watch import Injector, Watch
@@ -110,7 +110,7 @@ class _Follower:
         options = flight.scenario.options
         self._names = started_nodes(options.without)
         self._joined_at = time.monotonic()
-        self._topics_of_others = topics_of(options.without)
+        self._topics_of_others = published_topics(options.without)
         self._own = OwnNodes(monitor.node, options.without, options.join_timeout)
         self._fault_kinds = frozenset(fault.kind.name for fault in flight.scenario.process_faults)
         self._realtime = flight.plant_settings.realtime
@@ -151,7 +151,7 @@ class _Follower:
 
     def _change(self, names: Sequence[str], transition: str) -> None:
         for name in change_state(self._monitor.node, names, transition, self._check_start):
-            output = self._graph.host_of(name.removesuffix("_node")).output_tail()
+            output = self._graph.host_process(name.removesuffix("_node")).output_tail()
             raise FlightError(f"{name} refused to {transition}:\n{output}")
 
     def until_complete(self, show: FlightProgress) -> None:

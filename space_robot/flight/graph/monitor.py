@@ -109,14 +109,14 @@ class Monitor:
         before, self.modes[name] = self.modes.get(name), mode
         level_before, self._levels[name] = self._levels.get(name, 0), status.level
         is_news = before != mode and (status.level > 0 or level_before > 0)
-        return [Event(self._time_of(name), name, mode)] if is_news else []
+        return [Event(self._event_time(name), name, mode)] if is_news else []
 
-    def _time_of(self, name: str) -> float:
+    def _event_time(self, name: str) -> float:
         """Return the simulated time of a node's last report, from its tick."""
-        tick = self.tick_of(name)
+        tick = self.reported_tick(name)
         return tick * self._period if tick > 0 and self._period else self.simulated_s
 
-    def tick_of(self, name: str) -> int:
+    def reported_tick(self, name: str) -> int:
         """Return the tick that a node reported last; 0 if none."""
         with suppress(ValueError):  # somebody else's words
             return int(self.values.get(name, {}).get("tick", 0))

@@ -59,7 +59,7 @@ AWAITED = {
 """Topics that must be published in place of a node."""
 
 
-def topics_of(nodes: Sequence[str]) -> list[topics.Topic]:
+def published_topics(nodes: Sequence[str]) -> list[topics.Topic]:
     """Return the topics that nodes of these names must or may publish."""
     may = [topic for schema in SCHEMAS if schema.node in nodes for topic in schema.sends]
     return [*may, *(topic for node in nodes for topic in AWAITED[node])]

@@ -49,7 +49,7 @@ class ForkedProcess:
         try:
             self.pid, self._connection = self._server.fork(output)
         except ConnectionError:  # somebody has killed the server
-            _server_of.cache_clear()
+            _server_for.cache_clear()
             self._server = node_server()
             self.pid, self._connection = self._server.fork(output)
         self._connection.send((program, dict(environment), os.getcwd()))
@@ -68,11 +68,11 @@ class ForkedProcess:
 
 def node_server() -> ForkServer:
     """Return the server that forks the nodes of this process; the first call starts it."""
-    return _server_of(os.getpid())
+    return _server_for(os.getpid())
 
 
 @cache
-def _server_of(pid: int) -> ForkServer:
+def _server_for(pid: int) -> ForkServer:
     """A process that is itself forked must not share its parent's."""
     server = ForkServer.of_module(__name__)
     atexit.register(server.close)

@@ -213,7 +213,7 @@ class Graph:
         """The process that ends, with exit code 0, when the flight has come to its end."""
         return self.nodes[self._leader]
 
-    def host_of(self, node: str) -> NodeProcess:
+    def host_process(self, node: str) -> NodeProcess:
         """The process of a node."""
         return self.nodes.get(node, self.leader)
 

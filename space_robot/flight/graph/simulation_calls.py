@@ -67,7 +67,7 @@ def _caller(
     """Join the graph of a service with a node; yield it with a check that the service is there."""
     namespace = full_namespace(namespace)
     domain = domain_asked_for(domain)
-    domain = _domain_of_plant(namespace) if domain is None else domain
+    domain = _plant_domain(namespace) if domain is None else domain
     visitor = TemporaryNode(name, domain, namespace)
     try:
         yield visitor.node, _wait_for(visitor.node, service, domain)
@@ -75,7 +75,7 @@ def _caller(
         visitor.leave()
 
 
-def _domain_of_plant(namespace: str) -> int:
+def _plant_domain(namespace: str) -> int:
     """Return the domain of the only plant of a ``namespace`` on this machine."""
     domains = sorted(domain for domain, _ in living_nodes(PLANT, namespace))
     if len(domains) != 1:

@@ -72,7 +72,7 @@ class Watch:
 
     def check_recorder_exit(self) -> None:
         """Check, after all nodes have stopped, that the recorder kept everything."""
-        recorder = self._graph.host_of("recorder")
+        recorder = self._graph.host_process("recorder")
         if recorder.exit_code != 0 and "recorder" not in self._gone:
             self.failures.append(recorder.output_tail().splitlines()[-1].strip())
 
@@ -88,8 +88,8 @@ class Watch:
     def _lose_leader(self, leader: NodeProcess) -> None:
         """End the flight; if the plant has flown to its end it was the recorder that failed."""
         self._monitor.poll()
-        is_recorders = leader is self._graph.host_of("recorder")
-        self._has_flown = is_recorders and self._monitor.tick_of(PLANT) >= self._last_tick
+        is_recorders = leader is self._graph.host_process("recorder")
+        self._has_flown = is_recorders and self._monitor.reported_tick(PLANT) >= self._last_tick
         if not self._has_flown:
             raise leader.early_end()
 

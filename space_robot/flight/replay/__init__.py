@@ -1,1 +1,1 @@
-"""Replay: a recorded flight played to a live controller, with commands compared."""
+"""Replay: recorded states answered anew, with commands compared."""

@@ -59,9 +59,6 @@ class ControllerChoice:
             trust: whether modules and files that the description names may be opened.
             laws: in force in flight, by rising tick: of a bag without a description the first one
                 is the law that flew, with its gains.
-
-        Raises:
-            InputError: something recorded or given does not exist here, or does not fit.
         """
         if laws and "controller" not in flight:
             gains_used = {name: list(values) for name, values in laws[0].gains.items()}
@@ -85,7 +82,7 @@ class ControllerChoice:
         self._flight, self._folder, self._trust = flight, folder, trust
         self._flown = flown
         self._flown_swaps = [text for text in flown.get("swaps", ()) if text.strip()]
-        self._said = {
+        self._overrides = {
             **({"controller": controller} if controller else {}),
             **({"gains": gains} if gains else {}),
             **chosen,
@@ -105,11 +102,11 @@ class ControllerChoice:
             if recorded_gains and is_same_law:
                 of_laws = {law.name: dict(recorded_gains), **of_laws}
             self.parameters |= self._recorded_gains(of_laws)
-        if "actuators" not in self._said:
+        if "actuators" not in self._overrides:
             self.parameters |= self._actuators(flown)
-        if "navigation_sensors" not in self._said:
+        if "navigation_sensors" not in self._overrides:
             self.parameters |= _recorded_navigation(flight)
-        self.parameters |= self._said
+        self.parameters |= self._overrides
         if not trust:
             self._check_files(flown)
         self.swaps = [text for text in self.parameters.get("swaps", []) if text.strip()]
@@ -138,7 +135,7 @@ class ControllerChoice:
             kept = {
                 gain: list(values)
                 for gain, values in flown.gains.items()
-                if f"{law.name}.{gain}" not in self._said
+                if f"{law.name}.{gain}" not in self._overrides
             }
             law.gain_values = check_gains(
                 {**law.gain_values, **kept}, type(law), self._axes, "the bag"
@@ -146,16 +143,16 @@ class ControllerChoice:
 
     def _check_laws(self, named: str, flown: Mapping[str, Any]) -> None:
         """Check that no law but those shipped, or given by the user, is imported."""
-        if "controller" not in self._said:
+        if "controller" not in self._overrides:
             require_shipped_law(named)
-        if "swaps" not in self._said:
+        if "swaps" not in self._overrides:
             for swap in self._flown_swaps:
-                require_shipped_law(_law_of_swap(swap))
+                require_shipped_law(_swap_law(swap))
 
     def _check_files(self, flown: Mapping[str, Any]) -> None:
         """Check that no file is read whose path the bag tells."""
         for what in ("robot", "gains", "navigation_sensors", "actuators"):
-            if what not in self._said and self.parameters.get(what) == flown.get(what, ""):
+            if what not in self._overrides and self.parameters.get(what) == flown.get(what, ""):
                 require_shipped_file(what, str(flown[what]))
 
     def _robot(self, flown: Mapping[str, Any]) -> dict[str, str]:
@@ -184,7 +181,7 @@ class ControllerChoice:
     def _recorded_gains(self, of_laws: Mapping[str, Tree]) -> dict[str, Any]:
         """The recorded gains by law, in place of a gain set that is not on this machine."""
         parameters = dict(flatten(of_laws))
-        if of_laws and set(map(_law_of_swap, self._flown_swaps)) <= set(of_laws):
+        if of_laws and set(map(_swap_law, self._flown_swaps)) <= set(of_laws):
             parameters["gains"] = self.gains_name if self._has_gain_set() else DEFAULT
         return parameters
 
@@ -212,7 +209,7 @@ class ControllerChoice:
             one_of(swap.name, laws, "controller", " of swaps")
         self._hardware = assumed_actuators(settings.actuators, self.robot)
         self.names = self._hardware.robot_names(self.robot)
-        if "gains" in self._said:
+        if "gains" in self._overrides:
             return build_law(settings.controller, settings, axes)
         return next(iter(laws.values()))
 
@@ -224,7 +221,7 @@ def _recorded_navigation(flight: Mapping[str, Any]) -> dict[str, Any]:
     return {"navigation_sensors": "fine", **numbers} if numbers else {}
 
 
-def _law_of_swap(text: str) -> str:
+def _swap_law(text: str) -> str:
     return text.partition(":")[2].strip()
 
 

@@ -117,7 +117,7 @@ class Recording:
     def laws(self) -> tuple[LawInForce, ...]:
         """The laws in force, with their gains, by rising tick; empty: not recorded."""
         in_force = []
-        for _, tick, data in self._of_ticks(topics.LAW):
+        for _, tick, data in self._stamped_messages(topics.LAW):
             with suppress(MessageError):
                 in_force.append(LawCodec.decode(data, tick))
         return in_order(in_force)
@@ -131,7 +131,7 @@ class Recording:
         also one without its reference, for which the controller would have held an earlier one.
         """
         queues: dict[Topic, deque[tuple[int, bytes]]] = {topic: deque() for topic in parts}
-        for topic, tick, data in self._of_ticks(*parts):
+        for topic, tick, data in self._stamped_messages(*parts):
             queues[topic].append((tick, data))
             while all(queues.values()):
                 ticks = [queue[0][0] for queue in queues.values()]
@@ -158,7 +158,7 @@ class Recording:
     def references(self, topic: Topic, start: int = 0) -> Iterator[tuple[int, bytes]]:
         """First tick and data of half the reference, from the last message begun by ``start``."""
         begun: list[tuple[int, bytes]] = []
-        for _, tick, data in self._of_ticks(topic):
+        for _, tick, data in self._stamped_messages(topic):
             if tick <= start:
                 begun = [(tick, data)]
                 continue
@@ -167,7 +167,7 @@ class Recording:
             yield tick, data
         yield from begun
 
-    def _of_ticks(self, *wanted: Topic) -> Iterator[tuple[Topic, int, bytes]]:
+    def _stamped_messages(self, *wanted: Topic) -> Iterator[tuple[Topic, int, bytes]]:
         """Yield the messages of some topics whose stamps are whole ticks, with these."""
         for topic, data in self._messages(*wanted):
             with suppress(MessageError):

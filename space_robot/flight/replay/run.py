@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import time
+from array import array
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
@@ -33,7 +34,7 @@ from ...console.progress import flight_progress
 from ...processes.scratch_folder import ScratchFolder
 from ..compilation import compile_kernels
 from .choice import ControllerChoice
-from .comparison import CommandList, Comparison, ReplayedCommands
+from .comparison import CommandList, Comparison
 from .recording import Recording, StateMessages
 
 SHOW_TICKS = 500
@@ -304,100 +305,74 @@ def replay(options: ReplayOptions) -> Replay:
             options.trust,
             laws,
         )
-        return _Run(options, recording, choice, laws).run()
+        return _replay(options, recording, choice, laws)
 
 
-class _Run:
-    def __init__(
-        self,
-        options: ReplayOptions,
-        recording: Recording,
-        choice: ControllerChoice,
-        laws: Sequence[LawInForce],
-    ) -> None:
-        self._options, self._recording, self._choice = options, recording, choice
-        period = recording.timebase.period
-        check_time(options.start_s, "start")
-        check_time(min(options.end_s, LATEST_S), "end")
-        self._start = int(tick_from(options.start_s, period))
-        self._stop = tick_from(options.end_s, period)
-        self._recorded = self._read_commands()
-        self._parts = self._choose_parts()
-        if next(recording.states(self._parts, self._start, self._stop), None) is None:
-            raise InputError(f"{options.bag}: no states in the part to be replayed")
-        self._laws = within(laws, self._start, self._stop)
-        self._skipped = 0
+def _replay(
+    options: ReplayOptions,
+    recording: Recording,
+    choice: ControllerChoice,
+    laws: Sequence[LawInForce],
+) -> Replay:
+    period = recording.timebase.period
+    check_time(options.start_s, "start")
+    check_time(min(options.end_s, LATEST_S), "end")
+    start, stop = int(tick_from(options.start_s, period)), tick_from(options.end_s, period)
+    recorded = recording.commands(choice.names.commanded)
+    if recording.has_commands and not recording.is_finished and len(recorded.ticks):
+        stop = min(stop, int(recorded.ticks[-1]) + 1)
+    recorded = recorded.within(start, stop)
+    states = required_parts(recording, choice), start, stop
+    if next(recording.states(*states), None) is None:
+        raise InputError(f"{options.bag}: no states in the part to be replayed")
+    laws = within(laws, start, stop)
+    compile_kernels(bool(choice.names.actuators))
+    controller = ReplayedController(choice, recording, start)
+    in_force = RecordedLaws(
+        laws if choice.follows_flight else (), controller.put, controller.start_again
+    )
+    is_partly_answered = recording.has_commands and not recording.answers_are_complete
+    answered = set(recorded.ticks.tolist()) if is_partly_answered else ()
+    ticks, skipped = array("q"), 0
+    error: SpaceRobotError | None = None
+    count = min(float(recording.states_count), stop - start)
+    begin = time.perf_counter()
+    with flight_progress(count * period, f"replay, {choice.law_name}") as show:
+        try:
+            for state in recording.states(*states):
+                if is_partly_answered and state.tick not in answered:
+                    skipped += 1
+                    continue
+                in_force.before(state.tick)
+                ticks.append(state.tick)
+                controller.answer(state)
+                if len(ticks) % SHOW_TICKS == 0:
+                    show((state.tick - start) * period)
+        except (FlightError, LawError) as ended:
+            if len(ticks) == 1:
+                raise
+            error = ended
+        show(count * period)
+    elapsed, played = time.perf_counter() - begin, np.array(ticks, np.int64)
+    if error or not recording.is_finished:  # what came until then
+        recorded = recorded.within(start, max(ticks, default=start) + 1)
+    comparison = Comparison(
+        choice.names.commanded,
+        played,
+        recorded,
+        controller.answers.commands(),
+        (*choice.names.thrusters, *recording.flight.get("prismatic_joints", ())),
+        choice.names.torquers,
+    )
+    return Replay(options, choice, recording, comparison, laws, skipped, elapsed, error)
 
-    def _choose_parts(self) -> tuple[Topic, ...]:
-        """Return the parts of a state that the controller needs."""
-        parts = StateCodec(self._choice.names, self._recording.timebase).control_topics
-        if lacking := [topic.full_name for topic in parts if topic not in self._recording.parts]:
-            raise InputError(
-                f"{self._options.bag}: no messages on {', '.join(lacking)}, which a controller of "
-                "these actuators needs"
-            )
-        return parts
 
-    def _read_commands(self) -> ReplayedCommands:
-        """Return the commands to compare with, up to the last one of an unfinished bag."""
-        recording = self._recording
-        commands = recording.commands(self._choice.names.commanded)
-        if recording.has_commands and not recording.is_finished and len(commands.ticks):
-            self._stop = min(self._stop, int(commands.ticks[-1]) + 1)
-        return commands.within(self._start, self._stop)
-
-    def run(self) -> Replay:
-        """Answer every state, and compare."""
-        options, recording, choice = self._options, self._recording, self._choice
-        compile_kernels(bool(choice.names.actuators))
-        controller = ReplayedController(choice, recording, self._start)
-        laws = RecordedLaws(
-            self._laws if choice.follows_flight else (), controller.put, controller.start_again
+def required_parts(recording: Recording, choice: ControllerChoice) -> tuple[Topic, ...]:
+    """Return the parts of a state that the controller needs, all of which the bag has."""
+    parts = StateCodec(choice.names, recording.timebase).control_topics
+    if missing := [topic.full_name for topic in parts if topic not in recording.parts]:
+        raise InputError(
+            f"{recording.path}: no messages on {', '.join(missing)}, which a controller of these "
+            "actuators needs"
         )
-        ticks: list[int] = []
-        error: SpaceRobotError | None = None
-        period = recording.timebase.period
-        count = min(float(recording.states_count), self._stop - self._start)
-        begin = time.perf_counter()
-        with flight_progress(count * period, f"replay, {choice.law_name}") as show:
-            try:
-                for state in self._states():
-                    laws.before(state.tick)
-                    ticks.append(state.tick)
-                    controller.answer(state)
-                    if len(ticks) % SHOW_TICKS == 0:
-                        show((state.tick - self._start) * period)
-            except (FlightError, LawError) as ended:
-                error = ended
-            show(count * period)
-        elapsed, played = time.perf_counter() - begin, np.array(ticks, np.int64)
-        if error and len(played) < 2:
-            raise error
-        recorded = self._recorded
-        if error or not recording.is_finished:  # what came until then
-            recorded = recorded.within(self._start, int(played.max()) + 1)
-        comparison = Comparison(
-            choice.names.commanded,
-            played,
-            recorded,
-            controller.answers.commands(),
-            (*choice.names.thrusters, *recording.flight.get("prismatic_joints", ())),
-            choice.names.torquers,
-        )
-        return Replay(
-            options, choice, recording, comparison, self._laws, self._skipped, elapsed, error
-        )
-
-    def _states(self) -> Iterator[StateMessages]:
-        """Return the states that the controller answered."""
-        recording = self._recording
-        states = recording.states(self._parts, self._start, self._stop)
-        if not recording.has_commands or recording.answers_are_complete:
-            yield from states
-            return
-        answered = set(self._recorded.ticks.tolist())
-        for state in states:
-            if state.tick in answered:
-                yield state
-            else:
-                self._skipped += 1
+    return parts

@@ -172,16 +172,6 @@ def test_it_replays_to_the_last_bit(flown: Flown) -> None:
     np.testing.assert_array_equal(done.comparison.ticks, answered)
 
 
-def test_a_part_begins_under_the_law_in_force_there(flown: Flown) -> None:
-    """CTC has no memory: it is equal again once it has taken over from the applied torque."""
-    first, until = flown.log.laws[3].tick + 1, flown.log.laws[4].tick
-    part = {"start_s": first * PERIOD, "end_s": until * PERIOD}
-    done = replay(ReplayOptions(flown.bag, **part))
-    assert done.comparison.ticks.tolist() == list(range(first, until))
-    assert not done.comparison.equal[0]
-    assert done.comparison.equal[45:].all(), "the transfer lasts 40 ticks, in flight and now"
-
-
 def test_without_mission_the_last_point_is_held_and_without_recorder_the_exit_code_tells(
     tmp_path: Path,
 ) -> None:

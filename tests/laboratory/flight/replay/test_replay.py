@@ -18,11 +18,10 @@ from bags import entries_of, messages_in, rosbags_bag
 from flights import planned, simulated, space_robot_here
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from rosbags.rosbag2 import StoragePlugin, Writer
 
 from space_robot.flight.replay.choice import ControllerChoice
 from space_robot.flight.replay.recording import COMPARED, Recording
-from space_robot.flight.replay.run import ReplayOptions, replay
+from space_robot.flight.replay.run import ReferenceStream, ReplayOptions, replay
 from space_robot_control.controller.gains import build_laws, split_gains
 from space_robot_control.controller.settings import ControllerNodeSettings
 from space_robot_msgs_py import topics
@@ -32,7 +31,6 @@ from space_robot_msgs_py.bag.recorder import BagRecorder
 from space_robot_msgs_py.config.files import named_file
 from space_robot_msgs_py.config.validation import read_yaml
 from space_robot_msgs_py.errors import InputError
-from space_robot_msgs_py.wire.definitions import jazzy
 
 STATES = (topics.JOINT_STATES, topics.BASE_STATE)
 TICKS = 400
@@ -78,6 +76,18 @@ def test_states_and_references_come_as_recorded(bag: Path, tmp_path: Path) -> No
             assert [tick for tick, _ in recording.references(topic, start)] == ticks
 
 
+def test_references_are_read_as_late_as_in_flight() -> None:
+    """A ``goto`` at tick 150 overwrites what had been sent before it for later ticks."""
+    sent = ((tick, str(tick).encode()) for tick in (0, 100, 200, 300, 150, 250, 350))
+    read: list[int] = []
+    stream = ReferenceStream(
+        sent, lambda data: (int(data), np.empty(0)), lambda tick, _: read.append(tick)
+    )
+    for tick, expected in ((149, [0, 100]), (150, [0, 100, 200, 300, 150])):
+        stream.feed(tick)
+        assert read == expected
+
+
 def test_what_the_recorder_missed_is_known(bag: Path, tmp_path: Path) -> None:
     """By what their sender says: where the controller died, ticks without an answer are none."""
     died = {"faults": ["kill_controller@0.05"], "restart_controller": True}
@@ -86,24 +96,6 @@ def test_what_the_recorder_missed_is_known(bag: Path, tmp_path: Path) -> None:
     assert late.lost_commands == 30
     with pytest.raises(InputError, match="no messages on /reference/joints"):
         copied(bag, tmp_path / "bag", lambda name, number: "reference" not in name)
-
-
-def test_topics_of_other_names_are_remapped(bag: Path, tmp_path: Path) -> None:
-    with Writer(tmp_path / "bag", version=9, storage_plugin=StoragePlugin.MCAP) as writer:
-        store: dict[str, Any] = {"typestore": jazzy()}
-        connections = {
-            topic.full_name: writer.add_connection(f"/arm{topic.full_name}_1", topic.type, **store)
-            for topic in topics.ALL
-        }
-        for number, (name, data) in enumerate(messages_in(bag)):
-            writer.write(connections[name], number, data)
-    with pytest.raises(InputError, match=r"on /joint_states \(it has /arm/command_1, /arm/j"):
-        Recording(tmp_path / "bag")
-    remapped = Recording(tmp_path / "bag", {f"/arm{name}_1": name for name in topics.BY_NAME})
-    here = Recording(bag)
-    assert list(remapped.states(STATES)) == list(here.states(STATES))
-    axes = planned().robot.axis_names
-    np.testing.assert_array_equal(remapped.commands(axes).torque, here.commands(axes).torque)
 
 
 def cut_bag(bag: Path, part: float) -> Path:
