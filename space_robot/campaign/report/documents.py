@@ -49,7 +49,7 @@ def render(findings: Findings) -> str:
     return template("space_robot.campaign.report", "campaign.html.j2").render(
         name=findings.folder.name,
         flights=len(findings.table),
-        sections=[s for s in sections(findings) if s.tables or s.key in figures],
+        sections=[s for s in sections(findings) if s.tables or s.details or s.key in figures],
         figures=figures,
         study=yaml.safe_dump(content, sort_keys=False, allow_unicode=True, width=110),
     )

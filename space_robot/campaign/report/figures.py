@@ -414,5 +414,8 @@ def _draw_error_bar(
 ) -> None:
     value, low, high = estimate
     error = [[max(0.0, value - low)], [max(0.0, high - value)]]
-    x, y, key = (value, place, "xerr") if across else (place, value, "yerr")
-    axes.errorbar(x, y, color=style.colour, marker=style.marker, **{key: error}, **options)
+    options |= {"color": style.colour, "marker": style.marker}
+    if across:
+        axes.errorbar(value, place, xerr=error, **options)
+    else:
+        axes.errorbar(place, value, yerr=error, **options)
