@@ -185,8 +185,10 @@ def summary_table(findings: Findings) -> Table:
                 if (v.requirement, v.word) == (quantity.name, word)
             ]
             if named:
-                under = ", ".join(named) if len(named) <= MOST_CASES else f"{len(named)} cases"
-                rows.append([quantity.name, JudgedCell(f"{under}:", word, TONES[word])])
+                cases = ", ".join(named) if len(named) <= MOST_CASES else f"{len(named)} cases"
+                if len(named) == len(findings.laws) * len(findings.points) > 1:
+                    cases = f"all {len(named)} cases"
+                rows.append([quantity.name, JudgedCell(f"{cases}:", word, TONES[word])])
     rows += [["remark", text] for text in findings.remarks]
     return Table.of("Findings", _columns(["", ""]), rows)
 
@@ -453,7 +455,7 @@ def worst_table(findings: Findings, point: GridPoint, quantity: Quantity, law: s
     worst = findings.worst(point, quantity, law=law)
     values = [_value(row, quantity) for row in worst.to_dict("records")]
     runs, laws = worst["run"].tolist(), worst["law"].tolist()
-    notes = [findings.rerun_command(runs[0], laws[0])]
+    notes = [f"{findings.rerun_command(runs[0], laws[0])}    # the first of them"]
     if len(set(values)) == 1 and len(values) == WORST:
         rows = point.table[point.table["law"] == law] if law else point.table
         same = sum(_value(row, quantity) == values[0] for row in rows.to_dict("records"))
@@ -471,4 +473,5 @@ def worst_table(findings: Findings, point: GridPoint, quantity: Quantity, law: s
 def _value(row: dict[Any, Any], quantity: Quantity) -> str:
     if row["outcome"] == "complete":
         return number(float(row[quantity.column]), ".4g")
-    return f"{row['outcome']} at {row['ended_at_s']:.3g} s"
+    end = f" at {row['ended_at_s']:.3g} s" if row["ended_at_s"] >= 0.0 else ""
+    return f"{row['outcome']}{end}"

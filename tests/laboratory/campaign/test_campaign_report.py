@@ -76,7 +76,7 @@ def test_the_page_has_every_section() -> None:
 @pytest.fixture
 def no_figures(monkeypatch: pytest.MonkeyPatch) -> None:
     """Where it is about the page's text: figures take seconds."""
-    monkeypatch.setattr(documents, "drawings", lambda findings: iter(()))
+    monkeypatch.setattr(documents, "drawings", lambda findings: {})
 
 
 def test_every_command_flies_a_row_of_the_campaign() -> None:
