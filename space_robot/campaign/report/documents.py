@@ -11,7 +11,7 @@ from typing import Any
 import yaml
 from rich.console import Console
 
-from ...analysis.figures.figure_set import SavedFigure
+from ...analysis.figures.figure_set import Drawing, SavedFigure
 from ...analysis.figures.style import save_figure
 from ...analysis.template import template
 from ...console.tables import as_markdown
@@ -38,26 +38,28 @@ def markdown(findings: Findings) -> str:
 
 def render(findings: Findings) -> str:
     """Render the page; it loads nothing from other files or the network."""
-    figures: dict[str, list[tuple[str, str]]] = {}
     with TemporaryDirectory() as folder:
-        for number, drawing in enumerate(drawings(findings)):
-            (svg,) = save_figure(drawing.draw(), Path(folder) / str(number), png=False)
-            svg.write_text(lean(svg.read_text("utf-8")), "utf-8")
-            uri = SavedFigure(drawing.caption, svg).data_uri
-            figures.setdefault(drawing.section, []).append((drawing.caption, uri))
+        figures = {
+            section: [_image(drawing, Path(folder) / "figure") for drawing in own]
+            for section, own in drawings(findings).items()
+        }
     content = findings.study.model_dump(mode="json", by_alias=True, exclude_defaults=True)
     return template("space_robot.campaign.report", "campaign.html.j2").render(
         name=findings.folder.name,
         flights=len(findings.table),
-        sections=[s for s in sections(findings) if s.tables or s.key in figures],
+        sections=[s for s in sections(findings) if s.tables or s.details or s.key in figures],
         figures=figures,
         study=yaml.safe_dump(content, sort_keys=False, allow_unicode=True, width=110),
     )
 
 
-def lean(svg: str) -> str:
-    """Round the numbers of an SVG's paths to 0.01 points, which halves its size."""
-    return re.sub(r' d="[^"]*"', lambda path: re.sub(r"(\.\d\d)\d+", r"\1", path[0]), svg)
+def _image(drawing: Drawing, stem: Path) -> tuple[str, str]:
+    """Return caption and data URI; paths are rounded to 0.01 points, which halves their size."""
+    (svg,) = save_figure(drawing.draw(), stem, png=False)
+    text = svg.read_text("utf-8")
+    text = re.sub(r' d="[^"]*"', lambda path: re.sub(r"(\.\d\d)\d+", r"\1", path[0]), text)
+    svg.write_text(text, "utf-8")
+    return drawing.caption, SavedFigure(drawing.caption, svg).data_uri
 
 
 def record(findings: Findings) -> dict[str, Any]:

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections import defaultdict
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from math import log10
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -15,6 +16,7 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import LogFormatterSciNotation, LogLocator, NullFormatter
 from numpy.typing import NDArray
 
+from ...analysis.figures.figure_set import Drawing
 from ...analysis.figures.style import (
     COLOURS,
     GREY,
@@ -55,37 +57,29 @@ NARROW = 1.6
 """Axes with fewer decades have labels between powers of ten, too."""
 
 
-class CampaignDrawing(NamedTuple):
-    """A figure that is drawn on demand."""
-
-    section: str
-    """Key of its `Section`."""
-    caption: str
-    draw: Callable[[], Figure]
-
-
-def drawings(findings: Findings) -> Iterator[CampaignDrawing]:
-    """Yield all figures for which there are rows, without drawing them."""
+def drawings(findings: Findings) -> dict[str, list[Drawing]]:
+    """Return all figures for which there are rows, not drawn yet, by key of their `Section`."""
     table, points, laws = findings.table, findings.points, findings.laws
+    by_section: dict[str, list[Drawing]] = defaultdict(list)
     known = [q for q in findings.metrics if has_values(table, q.column)]
     several = len(points) > 1
     if several and known:
         caption = "Medians, with bars from 5 % to 95 % of the runs, at every point of the grid"
         draw = partial(grid_figure, points, laws, known, findings.grid)
-        yield CampaignDrawing("laws", caption, draw)
+        by_section["laws"].append(Drawing(caption, draw))
     shown = f" (the first {MOST_PANELS} points of the grid)" if len(points) > MOST_PANELS else ""
     lines = "median (thick) and 95 % (thin) of the runs" if several else "percentiles of the runs"
     ended = table["ended_at_s"][is_complete(table)].max()  # NaN if no flight is complete
     for name in series_in(table):
         caption = f"{column_label(name)} over time: {lines} at each time{shown}"
         draw = partial(band_figure, points, laws, name, np.nan_to_num(ended))
-        yield CampaignDrawing("bands", caption, draw)
+        by_section["bands"].append(Drawing(caption, draw))
     required = [q for q in findings.required if has_values(table, q.column)]
     for quantity in [*required, *known]:
         name = f" ({quantity.name})" if quantity.requirement else ""
         caption = f"Distribution of {quantity.heading}{name} over the runs{shown}"
         draw = partial(distribution_figure, points, laws, quantity)
-        yield CampaignDrawing("distributions", caption, draw)
+        by_section["distributions"].append(Drawing(caption, draw))
     for quantity in findings.judged:
         for point in points[:MOST_INFLUENCES]:
             matching = {
@@ -95,20 +89,22 @@ def drawings(findings: Findings) -> Iterator[CampaignDrawing]:
             }
             caption = f"Influence on {quantity.heading}{point.point and f', {point.point}'}"
             if matching:
-                yield CampaignDrawing("influences", caption, partial(influence_figure, matching))
+                draw = partial(influence_figure, matching)
+                by_section["influences"].append(Drawing(caption, draw))
     for metric in dict.fromkeys(s.metric for s in findings.sobol):
         indices = {
             s.law: {i.variable: i for i in s.indices} for s in findings.sobol if s.metric == metric
         }
         draw = partial(sobol_figure, indices)
-        yield CampaignDrawing("influences", f"Sobol indices of {metric}", draw)
+        by_section["influences"].append(Drawing(f"Sobol indices of {metric}", draw))
+    return by_section
 
 
 def summary_figure(findings: Findings) -> Figure | None:
     """Draw the most important figure: the first of the laws, or of the distributions."""
-    by_section = {drawing.section: drawing for drawing in reversed([*drawings(findings)])}
-    chosen = by_section.get("laws") or by_section.get("distributions")
-    return chosen.draw() if chosen else None
+    by_section = drawings(findings)
+    chosen = by_section["laws"] or by_section["distributions"]
+    return chosen[0].draw() if chosen else None
 
 
 @house_style()
@@ -414,5 +410,8 @@ def _draw_error_bar(
 ) -> None:
     value, low, high = estimate
     error = [[max(0.0, value - low)], [max(0.0, high - value)]]
-    x, y, key = (value, place, "xerr") if across else (place, value, "yerr")
-    axes.errorbar(x, y, color=style.colour, marker=style.marker, **{key: error}, **options)
+    options |= {"color": style.colour, "marker": style.marker}
+    if across:
+        axes.errorbar(value, place, xerr=error, **options)
+    else:
+        axes.errorbar(place, value, yerr=error, **options)

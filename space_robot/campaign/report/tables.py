@@ -21,7 +21,7 @@ TONES = {
 NO_DIFFERENCE = "no difference shown"
 STRONGEST = 5
 """Variables in a table of influences."""
-MOST_NAMED = 8
+MOST_CASES = 8
 """Laws and grid points that are named in one cell; more are counted."""
 SEQUENTIAL = (
     "By a confidence sequence (Robbins 1970; Howard and others 2021): met, if the share of cases "
@@ -68,7 +68,7 @@ INFLUENCE = (
     "numbers held fixed (partial) where there are enough runs. Spread: the share of the spread of "
     "ranks that the variable explains by itself, whatever the shape (Kruskal and Wallis); p of no "
     f"influence at all, corrected after Holm. Intervals are of {CONFIDENCE:.0%}. Failed flights "
-    "rank worst."
+    "rank worst. Where no influence is shown there is no table."
 )
 SOBOL = (
     "Shares of the metric's variance: what a variable brings by itself (first), and including its "
@@ -101,6 +101,7 @@ def sections(findings: Findings) -> list[Section]:
     else:
         by_point, laws = [], _noted(league_tables(findings), [RANKS])
         pairs = _noted(pair_tables(findings), [PAIRS])
+    influences = _noted(influence_tables(findings), [INFLUENCE])
     return [
         Section("findings", "Findings", "", _noted([summary_table(findings)], [])),
         Section("flown", "What was flown", "", [flown_table(findings), outcome_table(findings)]),
@@ -129,10 +130,8 @@ def sections(findings: Findings) -> list[Section]:
             "influences",
             "Influence of the variables",
             "",
-            [
-                *_noted(influence_tables(findings), [INFLUENCE]),
-                *_noted(sobol_tables(findings), [SOBOL]),
-            ],
+            [*([] if has_grid else influences), *_noted(sobol_tables(findings), [SOBOL])],
+            influences if has_grid else (),
         ),
         Section(
             "worst",
@@ -186,8 +185,10 @@ def summary_table(findings: Findings) -> Table:
                 if (v.requirement, v.word) == (quantity.name, word)
             ]
             if named:
-                under = ", ".join(named) if len(named) <= MOST_NAMED else f"{len(named)} cases"
-                rows.append([quantity.name, JudgedCell(f"{under}:", word, TONES[word])])
+                cases = ", ".join(named) if len(named) <= MOST_CASES else f"{len(named)} cases"
+                if len(named) == len(findings.laws) * len(findings.points) > 1:
+                    cases = f"all {len(named)} cases"
+                rows.append([quantity.name, JudgedCell(f"{cases}:", word, TONES[word])])
     rows += [["remark", text] for text in findings.remarks]
     return Table.of("Findings", _columns(["", ""]), rows)
 
@@ -454,7 +455,7 @@ def worst_table(findings: Findings, point: GridPoint, quantity: Quantity, law: s
     worst = findings.worst(point, quantity, law=law)
     values = [_value(row, quantity) for row in worst.to_dict("records")]
     runs, laws = worst["run"].tolist(), worst["law"].tolist()
-    notes = [findings.rerun_command(runs[0], laws[0])]
+    notes = [f"{findings.rerun_command(runs[0], laws[0])}    # the first of them"]
     if len(set(values)) == 1 and len(values) == WORST:
         rows = point.table[point.table["law"] == law] if law else point.table
         same = sum(_value(row, quantity) == values[0] for row in rows.to_dict("records"))
@@ -472,4 +473,5 @@ def worst_table(findings: Findings, point: GridPoint, quantity: Quantity, law: s
 def _value(row: dict[Any, Any], quantity: Quantity) -> str:
     if row["outcome"] == "complete":
         return number(float(row[quantity.column]), ".4g")
-    return f"{row['outcome']} at {row['ended_at_s']:.3g} s"
+    end = f" at {row['ended_at_s']:.3g} s" if row["ended_at_s"] >= 0.0 else ""
+    return f"{row['outcome']}{end}"

@@ -103,10 +103,10 @@ def sensitivity(
     correlations = dict(zip(numbers, zip(plain, partial, strict=True), strict=True))
     tested = {name: _compare_groups(series, ranks) for name, series in varied.items()}
     corrected = holm([p for _, p in tested.values()])
-    influences = [
-        Influence(name, *correlations.get(name, (None, None)), spread, p)
-        for (name, (spread, _)), p in zip(tested.items(), corrected, strict=True)
-    ]
+    influences = []
+    for (name, (spread, _)), p in zip(tested.items(), corrected, strict=True):
+        correlation, held = correlations.get(name, (None, None))
+        influences.append(Influence(name, correlation, held, spread, p))
     influences.sort(key=lambda influence: influence.strength, reverse=True)
     return Sensitivity(law, column.partition(".")[2], len(rows), influences, explained)
 

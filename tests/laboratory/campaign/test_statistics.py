@@ -217,17 +217,7 @@ def test_rows_with_a_failed_flight_are_left_out_and_counted() -> None:
 
 def test_a_table_of_the_design_becomes_its_rows() -> None:
     """Runs in any order; one is missing, one failed."""
-    table = pd.DataFrame(
-        {
-            "run": range(10),
-            "law": "ctc",
-            "outcome": "complete",
-            "vary.a": 0.0,
-            "vary.b": 0.0,
-            "vary.c": 0.0,
-            "metric.x": np.arange(10.0),
-        }
-    )
+    table = table_of(dict.fromkeys("abc", 0.0), np.arange(10.0))
     table.loc[3, "outcome"] = "diverged"
     table = table.drop(index=7).sample(frac=1.0, random_state=1)
     found = saltelli_values(table, "ctc", "metric.x")
