@@ -285,26 +285,24 @@ def remarks_on(flight: Flight) -> list[str]:
     from ..tuning.gain_check import pair_corner
     from ..tuning.warning import limit_remarks, margin_remarks
 
-    flown = [flight.law, *(law for _, law in flight.swaps)]
-    corner = pair_corner(flight.controller_settings)
-    names = flight.plant.names
+    names, robot = flight.plant.names, flight.plant.robot
     # the default gains of an ideal plant are the project's own choice: nobody is warned of them
     tries_margin = (
         flight.scenario.has_chosen_gains or bool(flight.scenario.faults) or bool(names.actuators)
     )
-    on_gains = margin_remarks(
-        flown,
-        flight.plant.robot,
-        flight.mission_settings,
-        corner,
-        flight.controls_base,
-        on_thrusters=bool(names.thrusters and not names.wheels),
-        on_thin_margin=tries_margin,
-        nominal=flight.robot,
-    )
-    on_limits = limit_remarks(flight.plant.robot, flight.mission_settings)
-    on_start = [f"warning: {text}" for text in flight.remarks]
-    on_demand = [f"warning: {text}" for text in [demand_remark(flight.scenario)] if text]
-    repaired = [f"repaired: {text}" for text in flight.robot.repairs]
-    units = [f"warning: {text}" for text in unit_remarks(flight.robot)]
-    return [*repaired, *units, *on_start, *on_demand, *on_gains, *on_limits]
+    warned = [*unit_remarks(flight.robot), *flight.remarks, demand_remark(flight.scenario)]
+    return [
+        *(f"repaired: {text}" for text in flight.robot.repairs),
+        *(f"warning: {text}" for text in warned if text),
+        *margin_remarks(
+            [flight.law, *(law for _, law in flight.swaps)],
+            robot,
+            flight.mission_settings,
+            pair_corner(flight.controller_settings),
+            flight.controls_base,
+            on_thrusters=bool(names.thrusters and not names.wheels),
+            on_thin_margin=tries_margin,
+            nominal=flight.robot,
+        ),
+        *limit_remarks(robot, flight.mission_settings),
+    ]

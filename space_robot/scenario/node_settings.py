@@ -43,7 +43,6 @@ SCHEMAS: tuple[type[NodeSettings], ...] = (
     RecorderNodeSettings,
 )
 
-
 _WAITING = "a flight's nodes wait for one another as they must"
 NOT_TO_BE_SET = {
     "plant.ticks": "use --duration",

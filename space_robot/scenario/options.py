@@ -8,9 +8,7 @@ imported, not even Pydantic, so that ``--help`` is quick.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Annotated, Any, Literal, get_args, get_origin, get_type_hints
-
-from annotated_types import Ge, Gt, Le
+from typing import Any, Literal, get_args, get_origin, get_type_hints
 
 
 @dataclass(frozen=True)
@@ -38,8 +36,10 @@ class Option:
     """True if the option applies only to a graph of nodes."""
     is_launched: bool = True
     """True if the option is also an argument of the launch file."""
+    annotation: Any = Any
+    """Of the field."""
     kind: Any = Any
-    """Type of the field, from its annotation, without None; of a list, that of its items."""
+    """Its type without None; of a list, that of its items."""
     is_list: bool = False
     choices: tuple[str, ...] = ()
 
@@ -59,7 +59,8 @@ class Option:
         kinds = [kind for kind in get_args(hint) if kind is not type(None)]
         kind = hint if get_origin(hint) is Literal or not kinds else kinds[0]
         choices = get_args(kind) if get_origin(kind) is Literal else ()
-        return replace(self, kind=kind, is_list=get_origin(hint) is list, choices=choices)
+        is_list = get_origin(hint) is list
+        return replace(self, annotation=hint, kind=kind, is_list=is_list, choices=choices)
 
 
 option: Any = Option  # a field has the type of its value, not this one
@@ -244,14 +245,10 @@ OPTIONS: dict[str, Option] = {}
 
 
 def _read_fields() -> None:
-    """Collect the options; Pydantic finds types, limits and defaults in their places."""
     for name, hint in get_type_hints(Options).items():
         Options.__annotations__[name] = hint
         if isinstance(option := vars(Options)[name], Option):
             OPTIONS[name] = option.with_type(hint)
-            ends = ((Ge, option.low), (Le, option.high), (Gt, option.above))
-            if limits := [limit(value) for limit, value in ends if value is not None]:
-                Options.__annotations__[name] = Annotated[(hint, *limits)]
             setattr(Options, name, option.default)
 
 
