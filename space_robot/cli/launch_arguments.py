@@ -47,7 +47,7 @@ class LaunchedFlight(NamedTuple):
 
     flight: Flight
     bag: Path
-    of_ros: dict[str, dict[str, Any]]
+    ros_parameters: dict[str, dict[str, Any]]
     """Parameters by node that every ROS node has, from the parameter file."""
 
 
@@ -146,7 +146,7 @@ def launched_flight(values: Mapping[str, str], group: str = "") -> LaunchedFligh
     for option in _plan.params:
         if isinstance(option, click.Option) and (text := values.get(_name(option), "")):
             words += _words(option, text)
-    own, of_ros = _file_parameters(values.get(PARAMS_FILE, ""))
+    own, ros_parameters = _file_parameters(values.get(PARAMS_FILE, ""))
     words += [
         f"--set={node}.{name}={json.dumps(value)}"
         for node, parameters in own.items()
@@ -160,7 +160,7 @@ def launched_flight(values: Mapping[str, str], group: str = "") -> LaunchedFligh
         raise InputError(error.format_message()) from None
     if faults := launched.flight.scenario.process_faults:
         raise InputError(f"fault {faults[0]}: that needs `space-robot fly`")
-    return launched._replace(of_ros=of_ros)
+    return launched._replace(ros_parameters=ros_parameters)
 
 
 def _words(option: click.Option, argument: str) -> list[str]:
@@ -175,8 +175,8 @@ def _file_parameters(file: str) -> tuple[dict[str, dict[str, Any]], dict[str, di
     from space_robot_msgs_py.config.files import flatten, is_of_ros, node_parameters
 
     own: dict[str, dict[str, Any]] = {node: {} for node in NODES}
-    of_ros: dict[str, dict[str, Any]] = {node: {} for node in NODES}
+    ros_parameters: dict[str, dict[str, Any]] = {node: {} for node in NODES}
     for node in NODES if file else ():
         for name, value in flatten(node_parameters(Path(file), node)):
-            (of_ros if is_of_ros(name) else own)[node][name] = value
-    return own, of_ros
+            (ros_parameters if is_of_ros(name) else own)[node][name] = value
+    return own, ros_parameters

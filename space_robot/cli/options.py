@@ -218,11 +218,9 @@ OTHERS: dict[str, Decorator] = {
     "json": click.option("--json", "as_json", is_flag=True, help="Print the report as JSON."),
 }
 """Options of flying commands that do not define the flight."""
-_OF_A_FLIGHT = ("bag", "set", "scenario", "json")
-ON_A_GRAPH = (*OPTIONS, *_OF_A_FLIGHT)
-ON_A_FLIGHT = tuple(
-    name for name in ON_A_GRAPH if name in _OF_A_FLIGHT or not OPTIONS[name].needs_graph
-)
+_EXTRAS = ("bag", "set", "scenario", "json")
+ON_A_GRAPH = (*OPTIONS, *_EXTRAS)
+ON_A_FLIGHT = tuple(name for name in ON_A_GRAPH if name in _EXTRAS or not OPTIONS[name].needs_graph)
 
 
 def flight_option(name: str) -> Decorator:
