@@ -167,7 +167,7 @@ def _use_scenario(
     flown = {key: value for key, value in content.items() if key in Scenario.model_fields}
     context.meta[_PARAMETERS] = validate(Scenario, flown, str(path)).parameters
     content.pop("parameters", None)
-    context.default_map = {**(context.default_map or {}), **content}
+    context.default_map = {**content, **(context.default_map or {})}
 
 
 def _scenario_option(help: str, ignored: Collection[str] = ()) -> Decorator:
