@@ -69,8 +69,6 @@ option: Any = Option  # a field has the type of its value, not this one
 class Options:
     """Fields of a scenario; one of type Any is a name, a path or an object."""
 
-    """Fields of a scenario; a field of type Any is a name, a path or an object."""
-
     controller: Any = option(
         "Law: {names}, or file.py:Class of your own",
         "tde_stc",
@@ -245,6 +243,7 @@ OPTIONS: dict[str, Option] = {}
 
 
 def _read_fields() -> None:
+    """Collect the options, and leave their defaults in their places."""
     for name, hint in get_type_hints(Options).items():
         Options.__annotations__[name] = hint
         if isinstance(option := vars(Options)[name], Option):

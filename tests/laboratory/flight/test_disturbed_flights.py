@@ -209,10 +209,7 @@ OF_FILE = f".*wind.csv: {NO_JOINT9}"
         ({"disturbance": "no_such.csv"}, ".*no_such.csv: no such file"),
         ({"disturbance": lambda t: None}, ".*the function returned None at 0 s; a mapping of num"),
         ({"disturbance": lambda t: [t]}, r".*returned \[0.0\] at 0 s; a mapping of numbers"),
-        (
-            {"disturbance": lambda t: {"joint1": math.nan}},
-            ".* at 0 s; a number was expected for joint1",
-        ),
+        ({"disturbance": lambda t: {"joint1": math.nan}}, ".*at 0 s; a number was expected for j"),
         ({"disturbance": WRONG}, f"disturbance: {NO_JOINT9}"),
         ({"disturbance": TEXT}, f"disturbance: {NO_JOINT9}"),
         (in_plant("disturbance.table", TEXT), f"disturbance: {NO_JOINT9}"),
