@@ -107,7 +107,7 @@ REPAIR = click.option(
 def _click_option(name: str) -> Decorator:
     option = OPTIONS[name]
     default, dashed = option.default, f"--{name.replace('_', '-')}"
-    flag = option.flag or dashed
+    flag = dashed.removesuffix("s") if option.is_list else dashed
     settings: dict[str, Any] = {"help": option.help_text, "default": default}
     if option.choices:
         settings["type"] = click.Choice(option.choices)
@@ -126,7 +126,7 @@ def _click_option(name: str) -> Decorator:
     if option.metavar:
         settings["metavar"] = option.metavar
     if option.folder:
-        settings["shell_complete"] = names_in(option.folder, option.other_names)
+        settings["shell_complete"] = names_in(option.folder, [default] if default else [])
     if default or (option.kind is int and default is not None):
         settings["show_default"] = True
     if name == "faults":

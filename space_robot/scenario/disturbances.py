@@ -74,7 +74,8 @@ def _row(value: Any, time: float) -> dict[str, float]:
     """Return the numbers of a function by column."""
     returned = f"disturbance: the function returned {short(value)}"
     is_list = isinstance(value, Sequence) and not isinstance(value, str)
-    if (is_list or getattr(value, "ndim", 0)) and len(value) == len(BASE):
+    is_array = isinstance(value, np.ndarray) and value.ndim > 0
+    if (is_list or is_array) and len(value) == len(BASE):
         value = dict(zip(BASE, value, strict=True))
     if not isinstance(value, Mapping):
         raise InputError(

@@ -23,13 +23,9 @@ class Option:
     low: float | None = None
     high: float | None = None
     above: float | None = None
-    flag: str = ""
-    """On the command line (empty: --name)."""
     metavar: str = ""
     folder: str = ""
     """Folder of config/ with the files, or folders, that can be named."""
-    other_names: tuple[str, ...] = ()
-    """Names without a file there."""
     node: str = ""
     """Node for which alone it is; without meaning where that node is another's."""
     needs_graph: bool = False
@@ -107,7 +103,6 @@ class Options:
         "Gain set: printed, tuned, robust, default (printed where it flies), or a path",
         "default",
         folder="gains/paper",
-        other_names=("default",),
         node="controller",
     )
     robot: Any = option(
@@ -149,14 +144,12 @@ class Options:
     swaps: list[str] = option(
         "Swap to LAW at T simulated seconds; may be repeated",
         [],
-        flag="--swap",
         metavar="T:LAW",
         node="controller",
     )
     faults: list[str] = option(
         "Inject a fault at T simulated seconds; may be repeated; --fault list lists all kinds",
         [],
-        flag="--fault",
         metavar="KIND@T[-END][:ARG]",
     )
     events: list[str] = option(
@@ -164,7 +157,6 @@ class Options:
         "simulated seconds; may be repeated",
         [],
         default_text="the mission's events",
-        flag="--event",
         metavar="capture@T:TARGET|release@T[:SPEED]",
     )
     seed: int = option("Seed of the random numbers of faults and sensors", 0, low=0)
