@@ -96,9 +96,9 @@ def fly(context: LaunchContext) -> list:
     names = [name for name, *_ in launch_arguments()]
     refuse_unknown(sys.argv, __file__, [*names, AUTOSTART, SHUTDOWN])
     group = context.launch_configurations.get("ros_namespace", "")  # as PushRosNamespace sets it
-    flight, bag, of_ros = launched_flight({name: value(name) for name in names}, group)
+    flight, bag, ros_parameters = launched_flight({name: value(name) for name in names}, group)
     folder = Path(mkdtemp(prefix="space_robot_launch_"))
-    file = launched_parameters(flight, bag, value(AUTOSTART) == "true", folder, of_ros)
+    file = launched_parameters(flight, bag, value(AUTOSTART) == "true", folder, ros_parameters)
     namespace = flight.scenario.options.namespace
     node_names = started_nodes(flight.scenario.options.without)
     nodes = [

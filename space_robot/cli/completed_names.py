@@ -21,7 +21,7 @@ def names_in(folder: str, others: Sequence[str] = ()) -> Complete:
     def complete(
         context: click.Context, parameter: click.Parameter, incomplete: str
     ) -> list[CompletionItem]:
-        names = [*others, *config_names(folder)]
+        names = sorted({*others, *config_names(folder)})
         items = [CompletionItem(name) for name in names if name.startswith(incomplete)]
         return items or [CompletionItem(incomplete, type="file")]
 

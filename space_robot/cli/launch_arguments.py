@@ -28,7 +28,6 @@ PARAMS_FILE = "params_file"
 """Argument for a ROS parameter file, as launch files name it; not an option of `fly`."""
 PACKAGE = "space_robot"
 """Package that `ros2 launch` is given before the name of a launch file."""
-_TRUTH = {"true": True, "false": False}
 
 
 class LaunchArgument(NamedTuple):
@@ -47,7 +46,7 @@ class LaunchedFlight(NamedTuple):
 
     flight: Flight
     bag: Path
-    of_ros: dict[str, dict[str, Any]]
+    ros_parameters: dict[str, dict[str, Any]]
     """Parameters by node that every ROS node has, from the parameter file."""
 
 
@@ -89,7 +88,7 @@ def _argument(option: click.Option) -> LaunchArgument:
     if option.multiple:
         description += " Separate several with spaces."
     elif option.is_flag:
-        choices = ("", *_TRUTH)
+        choices = ("", "true", "false")
     elif isinstance(option.type, click.Choice):
         choices = ("", *option.type.choices)
     return LaunchArgument(_name(option), description, choices, default)
@@ -142,32 +141,26 @@ def launched_flight(values: Mapping[str, str], group: str = "") -> LaunchedFligh
     Raises:
         InputError: values conflict, a name is unknown, or one needs `space-robot fly`.
     """
-    words = []
+    chosen: dict[str, Any] = {}
     for option in _plan.params:
         if isinstance(option, click.Option) and (text := values.get(_name(option), "")):
-            words += _words(option, text)
-    own, of_ros = _file_parameters(values.get(PARAMS_FILE, ""))
-    words += [
-        f"--set={node}.{name}={json.dumps(value)}"
+            chosen[str(option.name)] = shlex.split(text) if option.multiple else text
+    own, ros_parameters = _file_parameters(values.get(PARAMS_FILE, ""))
+    set_in_file = [
+        f"{node}.{name}={json.dumps(value)}"
         for node, parameters in own.items()
         for name, value in parameters.items()
     ]
+    chosen["parameters"] = [*chosen.get("parameters", ()), *set_in_file]
     try:
         launched: LaunchedFlight = _plan.main(
-            words, "fly.launch.py", standalone_mode=False, obj=group
+            [], "fly.launch.py", standalone_mode=False, obj=group, default_map=chosen
         )
     except click.ClickException as error:
         raise InputError(error.format_message()) from None
     if faults := launched.flight.scenario.process_faults:
         raise InputError(f"fault {faults[0]}: that needs `space-robot fly`")
-    return launched._replace(of_ros=of_ros)
-
-
-def _words(option: click.Option, argument: str) -> list[str]:
-    if option.is_flag:
-        return (option.opts if _TRUTH[argument.lower()] else option.secondary_opts)[:1]
-    texts = shlex.split(argument) if option.multiple else [argument]
-    return [f"{max(option.opts, key=len)}={text}" for text in texts]
+    return launched._replace(ros_parameters=ros_parameters)
 
 
 def _file_parameters(file: str) -> tuple[dict[str, dict[str, Any]], dict[str, dict[str, Any]]]:
@@ -175,8 +168,8 @@ def _file_parameters(file: str) -> tuple[dict[str, dict[str, Any]], dict[str, di
     from space_robot_msgs_py.config.files import flatten, is_of_ros, node_parameters
 
     own: dict[str, dict[str, Any]] = {node: {} for node in NODES}
-    of_ros: dict[str, dict[str, Any]] = {node: {} for node in NODES}
+    ros_parameters: dict[str, dict[str, Any]] = {node: {} for node in NODES}
     for node in NODES if file else ():
         for name, value in flatten(node_parameters(Path(file), node)):
-            (of_ros if is_of_ros(name) else own)[node][name] = value
-    return own, of_ros
+            (ros_parameters if is_of_ros(name) else own)[node][name] = value
+    return own, ros_parameters

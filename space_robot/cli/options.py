@@ -107,7 +107,7 @@ REPAIR = click.option(
 def _click_option(name: str) -> Decorator:
     option = OPTIONS[name]
     default, dashed = option.default, f"--{name.replace('_', '-')}"
-    flag = option.flag or dashed
+    flag = dashed.removesuffix("s") if option.is_list else dashed
     settings: dict[str, Any] = {"help": option.help_text, "default": default}
     if option.choices:
         settings["type"] = click.Choice(option.choices)
@@ -126,7 +126,7 @@ def _click_option(name: str) -> Decorator:
     if option.metavar:
         settings["metavar"] = option.metavar
     if option.folder:
-        settings["shell_complete"] = names_in(option.folder, option.other_names)
+        settings["shell_complete"] = names_in(option.folder, [default] if default else [])
     if default or (option.kind is int and default is not None):
         settings["show_default"] = True
     if name == "faults":
@@ -167,7 +167,7 @@ def _use_scenario(
     flown = {key: value for key, value in content.items() if key in Scenario.model_fields}
     context.meta[_PARAMETERS] = validate(Scenario, flown, str(path)).parameters
     content.pop("parameters", None)
-    context.default_map = {**(context.default_map or {}), **content}
+    context.default_map = {**content, **(context.default_map or {})}
 
 
 def _scenario_option(help: str, ignored: Collection[str] = ()) -> Decorator:
@@ -218,11 +218,9 @@ OTHERS: dict[str, Decorator] = {
     "json": click.option("--json", "as_json", is_flag=True, help="Print the report as JSON."),
 }
 """Options of flying commands that do not define the flight."""
-_OF_A_FLIGHT = ("bag", "set", "scenario", "json")
-ON_A_GRAPH = (*OPTIONS, *_OF_A_FLIGHT)
-ON_A_FLIGHT = tuple(
-    name for name in ON_A_GRAPH if name in _OF_A_FLIGHT or not OPTIONS[name].needs_graph
-)
+_EXTRAS = ("bag", "set", "scenario", "json")
+ON_A_GRAPH = (*OPTIONS, *_EXTRAS)
+ON_A_FLIGHT = tuple(name for name in ON_A_GRAPH if name in _EXTRAS or not OPTIONS[name].needs_graph)
 
 
 def flight_option(name: str) -> Decorator:
@@ -285,26 +283,24 @@ def remarks_on(flight: Flight) -> list[str]:
     from ..tuning.gain_check import pair_corner
     from ..tuning.warning import limit_remarks, margin_remarks
 
-    flown = [flight.law, *(law for _, law in flight.swaps)]
-    corner = pair_corner(flight.controller_settings)
-    names = flight.plant.names
+    names, robot = flight.plant.names, flight.plant.robot
     # the default gains of an ideal plant are the project's own choice: nobody is warned of them
     tries_margin = (
         flight.scenario.has_chosen_gains or bool(flight.scenario.faults) or bool(names.actuators)
     )
-    on_gains = margin_remarks(
-        flown,
-        flight.plant.robot,
-        flight.mission_settings,
-        corner,
-        flight.controls_base,
-        on_thrusters=bool(names.thrusters and not names.wheels),
-        on_thin_margin=tries_margin,
-        nominal=flight.robot,
-    )
-    on_limits = limit_remarks(flight.plant.robot, flight.mission_settings)
-    on_start = [f"warning: {text}" for text in flight.remarks]
-    on_demand = [f"warning: {text}" for text in [demand_remark(flight.scenario)] if text]
-    repaired = [f"repaired: {text}" for text in flight.robot.repairs]
-    units = [f"warning: {text}" for text in unit_remarks(flight.robot)]
-    return [*repaired, *units, *on_start, *on_demand, *on_gains, *on_limits]
+    warned = [*unit_remarks(flight.robot), *flight.remarks, demand_remark(flight.scenario)]
+    return [
+        *(f"repaired: {text}" for text in flight.robot.repairs),
+        *(f"warning: {text}" for text in warned if text),
+        *margin_remarks(
+            [flight.law, *(law for _, law in flight.swaps)],
+            robot,
+            flight.mission_settings,
+            pair_corner(flight.controller_settings),
+            flight.controls_base,
+            on_thrusters=bool(names.thrusters and not names.wheels),
+            on_thin_margin=tries_margin,
+            nominal=flight.robot,
+        ),
+        *limit_remarks(robot, flight.mission_settings),
+    ]

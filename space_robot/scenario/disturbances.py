@@ -72,29 +72,22 @@ def table_parameters(disturbance: str | Columns | Load) -> dict[str, str]:
 
 def _row(value: Any, time: float) -> dict[str, float]:
     """Return the numbers of a function by column."""
-    if isinstance(value, Mapping):
-        numbers = {str(name): value[name] for name in value}
-    elif isinstance(value, (np.ndarray, Sequence)) and not isinstance(value, str):
-        if len(value) != len(BASE):
-            raise InputError(
-                f"disturbance: the function returned {len(value)} numbers at {time:g} s; a mapping "
-                f"or {len(BASE)} were expected: {', '.join(BASE)}"
-            )
-        numbers = dict(zip(BASE, value, strict=True))
-    else:
+    returned = f"disturbance: the function returned {short(value)}"
+    is_list = isinstance(value, Sequence) and not isinstance(value, str)
+    is_array = isinstance(value, np.ndarray) and value.ndim > 0
+    if (is_list or is_array) and len(value) == len(BASE):
+        value = dict(zip(BASE, value, strict=True))
+    if not isinstance(value, Mapping):
         raise InputError(
-            f"disturbance: the function returned {short(value)} at {time:g} s; a mapping of "
-            f"numbers by column, or {len(BASE)} numbers, was expected"
+            f"{returned} at {time:g} s; a mapping of numbers by column, or {len(BASE)} numbers "
+            f"({', '.join(BASE)}), was expected"
         )
     row = {}
-    for name, number in numbers.items():
+    for name, number in value.items():
         is_number = isinstance(number, (int, float)) or getattr(number, "shape", 0) == ()
-        row[name] = float(number) if is_number and np.isrealobj(number) else math.nan
-        if not math.isfinite(row[name]):
-            raise InputError(
-                f"disturbance: the function returned {short(number)} for {name} at {time:g} s; a "
-                "number was expected"
-            )
+        row[str(name)] = float(number) if is_number and np.isrealobj(number) else math.nan
+        if not math.isfinite(row[str(name)]):
+            raise InputError(f"{returned} at {time:g} s; a number was expected for {name}")
     return row
 
 

@@ -43,7 +43,6 @@ SCHEMAS: tuple[type[NodeSettings], ...] = (
     RecorderNodeSettings,
 )
 
-
 _WAITING = "a flight's nodes wait for one another as they must"
 NOT_TO_BE_SET = {
     "plant.ticks": "use --duration",
@@ -63,7 +62,7 @@ NOT_TO_BE_SET = {
     **{f"{node}.period": "use --period, which is for all nodes" for node in NODES},
 }
 """Parameters set by the flight itself, and the option to use instead."""
-OPTIONS_OF_NODES = ("period", "paused")
+SET_BY_OPTIONS = ("period", "paused")
 """Those among them that options of a flight set."""
 
 

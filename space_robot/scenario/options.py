@@ -8,9 +8,7 @@ imported, not even Pydantic, so that ``--help`` is quick.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Annotated, Any, Literal, get_args, get_origin, get_type_hints
-
-from annotated_types import Ge, Gt, Le
+from typing import Any, Literal, get_args, get_origin, get_type_hints
 
 
 @dataclass(frozen=True)
@@ -25,21 +23,19 @@ class Option:
     low: float | None = None
     high: float | None = None
     above: float | None = None
-    flag: str = ""
-    """On the command line (empty: --name)."""
     metavar: str = ""
     folder: str = ""
     """Folder of config/ with the files, or folders, that can be named."""
-    other_names: tuple[str, ...] = ()
-    """Names without a file there."""
     node: str = ""
     """Node for which alone it is; without meaning where that node is another's."""
     needs_graph: bool = False
     """True if the option applies only to a graph of nodes."""
     is_launched: bool = True
     """True if the option is also an argument of the launch file."""
+    annotation: Any = Any
+    """Of the field."""
     kind: Any = Any
-    """Type of the field, from its annotation, without None; of a list, that of its items."""
+    """Its type without None; of a list, that of its items."""
     is_list: bool = False
     choices: tuple[str, ...] = ()
 
@@ -59,7 +55,8 @@ class Option:
         kinds = [kind for kind in get_args(hint) if kind is not type(None)]
         kind = hint if get_origin(hint) is Literal or not kinds else kinds[0]
         choices = get_args(kind) if get_origin(kind) is Literal else ()
-        return replace(self, kind=kind, is_list=get_origin(hint) is list, choices=choices)
+        is_list = get_origin(hint) is list
+        return replace(self, annotation=hint, kind=kind, is_list=is_list, choices=choices)
 
 
 option: Any = Option  # a field has the type of its value, not this one
@@ -67,8 +64,6 @@ option: Any = Option  # a field has the type of its value, not this one
 
 class Options:
     """Fields of a scenario; one of type Any is a name, a path or an object."""
-
-    """Fields of a scenario; a field of type Any is a name, a path or an object."""
 
     controller: Any = option(
         "Law: {names}, or file.py:Class of your own",
@@ -108,7 +103,6 @@ class Options:
         "Gain set: printed, tuned, robust, default (printed where it flies), or a path",
         "default",
         folder="gains/paper",
-        other_names=("default",),
         node="controller",
     )
     robot: Any = option(
@@ -150,14 +144,12 @@ class Options:
     swaps: list[str] = option(
         "Swap to LAW at T simulated seconds; may be repeated",
         [],
-        flag="--swap",
         metavar="T:LAW",
         node="controller",
     )
     faults: list[str] = option(
         "Inject a fault at T simulated seconds; may be repeated; --fault list lists all kinds",
         [],
-        flag="--fault",
         metavar="KIND@T[-END][:ARG]",
     )
     events: list[str] = option(
@@ -165,7 +157,6 @@ class Options:
         "simulated seconds; may be repeated",
         [],
         default_text="the mission's events",
-        flag="--event",
         metavar="capture@T:TARGET|release@T[:SPEED]",
     )
     seed: int = option("Seed of the random numbers of faults and sensors", 0, low=0)
@@ -244,14 +235,11 @@ OPTIONS: dict[str, Option] = {}
 
 
 def _read_fields() -> None:
-    """Collect the options; Pydantic finds types, limits and defaults in their places."""
+    """Collect the options, and leave their defaults in their places."""
     for name, hint in get_type_hints(Options).items():
         Options.__annotations__[name] = hint
         if isinstance(option := vars(Options)[name], Option):
             OPTIONS[name] = option.with_type(hint)
-            ends = ((Ge, option.low), (Le, option.high), (Gt, option.above))
-            if limits := [limit(value) for limit, value in ends if value is not None]:
-                Options.__annotations__[name] = Annotated[(hint, *limits)]
             setattr(Options, name, option.default)
 
 

@@ -30,7 +30,7 @@ from space_robot_sim.plant.report import actuators, plant_description
 from space_robot_sim.plant.settings import MOST_TICKS, PLANT_KINDS
 
 from .faults import PROCESS_KINDS
-from .node_settings import NODES, NOT_TO_BE_SET, OPTIONS_OF_NODES, FlightSettings
+from .node_settings import NODES, NOT_TO_BE_SET, SET_BY_OPTIONS, FlightSettings
 from .options import OPTIONS
 from .robots import Robots
 from .scenario import Scenario
@@ -92,7 +92,7 @@ class ResolvedScenario(FlightSettings):
             node: {
                 name: value
                 for name, value in flatten(getattr(self, node).model_dump(mode="json"))
-                if f"{node}.{name}" not in NOT_TO_BE_SET or name in OPTIONS_OF_NODES
+                if f"{node}.{name}" not in NOT_TO_BE_SET or name in SET_BY_OPTIONS
             }
             for node in NODES
         }

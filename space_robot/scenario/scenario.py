@@ -5,9 +5,9 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
-from pydantic import ValidationError, ValidationInfo, field_validator
+from pydantic import Field, ValidationError, ValidationInfo, field_validator
 from typing_extensions import Self
 
 from space_robot_msgs_py.config.arguments import as_path
@@ -25,6 +25,12 @@ if TYPE_CHECKING:
     from ..flight.plan import Flight
 
 NO_FRICTION = {"friction.coulomb": 0.0, "friction.viscous": 0.0}
+
+for _name, _option in OPTIONS.items():  # errors of numbers show the description, with the unit
+    _limits = Field(
+        description=_option.help_text, ge=_option.low, le=_option.high, gt=_option.above
+    )
+    Options.__annotations__[_name] = Annotated[_option.annotation, _limits]
 
 
 class Scenario(StrictModel, Options):
@@ -208,10 +214,6 @@ class Scenario(StrictModel, Options):
         return f"Scenario({said})"
 
     __str__ = __repr__
-
-
-for _name, _option in OPTIONS.items():  # an error of a number shows it, as it has the unit
-    Scenario.model_fields[_name].description = _option.help_text
 
 
 def _text(value: object) -> str:

@@ -238,11 +238,13 @@ def test_parameters_of_every_ros_node_go_to_the_nodes_unchanged(tmp_path: Path) 
         "    hold_ticks: 40\n"
         "    qos_overrides: {/clock: {publisher: {depth: 7}}}\n"
     )
-    flight, _, of_ros = launched_flight({"params_file": str(file)})
+    flight, _, ros_parameters = launched_flight({"params_file": str(file)})
     assert flight.scenario.options.parameters == {"plant": {"hold_ticks": 40}}
     everywhere = {"use_sim_time": True}
     depth = {"qos_overrides./clock.publisher.depth": 7}
-    assert of_ros == {node: everywhere for node in NODES} | {"plant": {**everywhere, **depth}}
+    assert ros_parameters == {node: everywhere for node in NODES} | {
+        "plant": {**everywhere, **depth}
+    }
 
 
 @pytest.mark.parametrize(
