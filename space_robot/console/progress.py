@@ -6,7 +6,6 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
-from typing import Protocol
 
 from rich.progress import (
     BarColumn,
@@ -73,17 +72,14 @@ def counting_progress(
         yield begin
 
 
-class ShowCounts(Protocol):
-    """Shows the number of done tasks, the total number and a remark."""
-
-    def __call__(self, done: int, total: int, remark: str = "") -> None: ...  # noqa: D102
-
-
 @contextmanager
-def rated_progress(what: str, line_s: float = LINE_S) -> Iterator[ShowCounts]:
+def rated_progress(what: str, line_s: float = LINE_S) -> Iterator[Callable[..., None]]:
     """Show a progress line with rate and remaining time for many tasks, from the first call on.
 
     In a file, such as the log of a cluster job, it is a line every ``line_s`` seconds.
+
+    Yields:
+        A function of the number of done tasks, the total number, and a remark.
     """
     with ExitStack() as stack:
         progress: Progress | None = None
