@@ -27,7 +27,7 @@ LINE_S = 60.0
 """Time between two lines in a file, where no line can be redrawn."""
 WATCH_S, WATCHED_LINE_S = 0.5, 5.0
 """Time between two counts of watched tasks, and between two lines about them."""
-COUNTS = "{task.completed:.0f}/{task.total:.0f}"
+DONE_OF_TOTAL = "{task.completed:.0f}/{task.total:.0f}"
 
 
 class FlightProgress:
@@ -65,7 +65,7 @@ def counting_progress(
     with ExitStack() as stack:
 
         def begin(total: int) -> Callable[[], None]:
-            progress = stack.enter_context(_bar(COUNTS, is_transient=is_transient))
+            progress = stack.enter_context(_bar(DONE_OF_TOTAL, is_transient=is_transient))
             task = progress.add_task(what, total=total)
             return lambda: progress.advance(task)
 
@@ -92,7 +92,7 @@ def rated_progress(what: str, line_s: float = LINE_S) -> Iterator[Callable[..., 
                 say(console, ", ".join(filter(None, (f"{what} {done}/{total}", remark))))
             if progress is None:
                 remaining = TimeRemainingColumn(compact=True)
-                progress = stack.enter_context(_bar(COUNTS, _Rate(), remaining, _remark()))
+                progress = stack.enter_context(_bar(DONE_OF_TOTAL, _Rate(), remaining, _remark()))
                 progress.add_task(what, completed=done, total=total, remark=remark)
             else:
                 progress.update(progress.task_ids[0], completed=done, total=total, remark=remark)
