@@ -22,7 +22,7 @@ from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.samples import PASSIVE_FIELDS, STATE_FIELDS, StateSignals
 from space_robot_msgs_py.signals import Each, Signal, signals_of
 
-from ..console.files import csv_rows, csv_writer, whole_file
+from ..console.files import atomic_file, csv_rows, csv_writer
 from .errors import attitude_angles, controls_base, tracking_error
 from .report import recording
 
@@ -97,7 +97,7 @@ def write_parquet(log: FlightLog, path: Path) -> None:
         metadata={METADATA_KEY: json.dumps(metadata(log)).encode()},
     )
     with (
-        whole_file(path) as file,
+        atomic_file(path) as file,
         parquet.ParquetWriter(file, schema, compression="zstd", use_dictionary=False) as writer,
     ):
         for ticks, numbers in batches(log):

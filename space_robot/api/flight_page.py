@@ -13,7 +13,7 @@ from space_robot_model.robot import Robot
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.config.arguments import as_path
 
-from ..console.files import check_writable, make_folder, whole_file
+from ..console.files import atomic_file, check_writable, make_folder
 from ..console.progress import counting_progress
 
 if TYPE_CHECKING:
@@ -46,7 +46,7 @@ class FlightPage:
         file = as_path(path, "path")
         make_folder(file.parent)
         check_writable(file)
-        with whole_file(file, replace=True) as written:
+        with atomic_file(file, replace=True) as written:
             written.write(self.html.encode())
         return file
 

@@ -12,7 +12,7 @@ from space_robot_msgs_py.config.validation import validate
 from space_robot_msgs_py.errors import InputError
 from space_robot_sim.environment.environment import with_payload
 
-from ..console.files import make_folder, whole_file
+from ..console.files import atomic_file, make_folder
 from ..flight.plan import Scenario
 from ..scenario.node_settings import FlightSettings
 from ..scenario.robots import Robots
@@ -78,7 +78,7 @@ def write_set(tuned: Tuned, command: str, folder: Path) -> list[Path]:
     make_folder(folder)
     paths = []
     for name, text in gain_files(tuned, command).items():
-        with whole_file(folder / name, replace=True) as file:
+        with atomic_file(folder / name, replace=True) as file:
             file.write(text.encode())
         paths.append(folder / name)
     return paths

@@ -141,7 +141,7 @@ def analyze(
     descriptions: dict[str, dict[str, Any]] = {}
     for name, bag in zip(names, bags, strict=True):
         log = excerpt(read_flight(bag, remap, trust, namespace), from_s, to_s)
-        reports[name] = analyze(log, _set(log, actuators), budget)
+        reports[name] = analyze(log, _actuator_set(log, actuators), budget)
         descriptions[name] = log.flight
         if own:
             reports[name]["metrics"] |= {m.name: m.finite_value(log) for m in own}
@@ -188,7 +188,7 @@ def own_metrics(texts: Sequence[str]) -> list[OwnMetric]:
     return own
 
 
-def _set(log: FlightLog, name: str | None) -> ActuatorSet | None:
+def _actuator_set(log: FlightLog, name: str | None) -> ActuatorSet | None:
     """Read the set of base actuators to compare a flight with.
 
     Raises:

@@ -48,7 +48,7 @@ def copy(folder: Path) -> None:
       space-robot examples copy trials
       space-robot examples copy .
     """
-    from ..console.files import check_free, whole_file
+    from ..console.files import atomic_file, check_free
 
     share = _share()
     check_free(folder / "examples")
@@ -57,7 +57,7 @@ def copy(folder: Path) -> None:
     for file in files:
         target = folder / file.relative_to(share)
         target.parent.mkdir(parents=True, exist_ok=True)
-        with whole_file(target) as written:
+        with atomic_file(target) as written:
             written.write(file.read_bytes())
         shutil.copymode(file, target)
     click.echo(f"copied {len(files)} files to {folder / 'examples'} and {folder / 'config'}")

@@ -92,7 +92,7 @@ def export(
     from ..console.terminal import echo_json
     from ..export.folder import check_folder, write_folder, write_readme
     from ..export.recorded import recorded_flights
-    from ..export.software import export as exported_of
+    from ..export.software import export as export_software
     from ..export.verify import verify
     from ..flight.compilation import compile_kernels
     from ..scenario.scenario import Scenario
@@ -100,7 +100,7 @@ def export(
     check_folder(out, force)
     flight = plan_flight(**options)
     flight.check_in_process()
-    exported = exported_of(flight, laws)
+    exported = export_software(flight, laws)
     compile_kernels(bool(flight.plant.names.actuators))
     plan = validate(Scenario, options, "options")
     flights = recorded_flights(plan, exported, laws, acceptance_seconds)

@@ -56,7 +56,7 @@ def fly(as_json: bool, bag: Path | None, **options: Any) -> None:
     except FlightError as error:
         if as_json:
             ending = Ending.early(error, flight.period)
-            echo_json(flight_report(flight, ending, _metrics_of(bag), bag))
+            echo_json(flight_report(flight, ending, _recorded_metrics(bag), bag))
         raise
     ending = Ending.complete(flight.ticks, flight.period)
     if failures := report["graph"]["failures"]:
@@ -67,7 +67,7 @@ def fly(as_json: bool, bag: Path | None, **options: Any) -> None:
     ending.check()
 
 
-def _metrics_of(bag: Path) -> dict[str, Any]:
+def _recorded_metrics(bag: Path) -> dict[str, Any]:
     """Return the metrics of a flight that ended early; none if no tick is complete."""
     from space_robot_msgs_py.bag.reader import read_flight
     from space_robot_msgs_py.errors import InputError

@@ -66,11 +66,11 @@ def check(as_json: bool, mass_uncertainty: float, **options: Any) -> None:
     from space_robot_msgs_py.errors import SpaceRobotError
 
     from ..console.terminal import echo_json, terminal
-    from .gains_check import checked, print_checks, report_of
+    from .gains_check import check_laws, gains_report, print_checks
 
-    checks = checked(options, mass_uncertainty)
+    checks = check_laws(options, mass_uncertainty)
     if as_json:
-        echo_json(report_of(checks))
+        echo_json(gains_report(checks))
     else:
         print_checks(checks, terminal())
     for line in checks.remarks:
@@ -156,9 +156,9 @@ def tune(context: click.Context, /, output: Path, **options: Any) -> None:
     from ..tuning.warning import estimate_remark
 
     names = ("margin", "mass_uncertainty", "bandwidth", "ripple", "h_bar", "noise_ripple")
-    wishes, cases = TuningOptions(*(options.pop(name) for name in names)), options.pop("cases")
+    wanted, cases = TuningOptions(*(options.pop(name) for name in names)), options.pop("cases")
     with terminal(stderr=True).status("tuning") as status:
-        tuned = tuned_set(options, cases, wishes, status.update)
+        tuned = tuned_set(options, cases, wanted, status.update)
     for path in write_set(tuned, _command(context), output):
         click.echo(f"wrote {path}", err=True)
     if remark := estimate_remark(tuned):

@@ -39,7 +39,7 @@ GEARS_EVERY = 1.0
 
 
 @dataclass(frozen=True)
-class Checked:
+class CheckedGains:
     """Results for the laws checked on the robot and mission of a flight."""
 
     flight: Flight
@@ -94,7 +94,7 @@ class Checked:
         return [f"remark: {', '.join(laws)}: {why} {least}" for why, laws in kinds.items() if laws]
 
 
-def checked(options: dict[str, Any], mass_uncertainty: float = 0.2) -> Checked:
+def check_laws(options: dict[str, Any], mass_uncertainty: float = 0.2) -> CheckedGains:
     """Check the laws that the options of a command name.
 
     Args:
@@ -122,7 +122,7 @@ def checked(options: dict[str, Any], mass_uncertainty: float = 0.2) -> Checked:
             for check, name in zip(checks, names, strict=True)
         }
     estimates = {law.name: law.estimate for law in laws}
-    return Checked(
+    return CheckedGains(
         flight,
         checks,
         ripple,
@@ -158,7 +158,7 @@ def with_gears(
     """Add to the checks the laws' stability with the gears of the robot.
 
     Returns:
-        The checks, and frequencies as in `Checked`.
+        The checks, and frequencies as in `CheckedGains`.
     """
     robot = flight.plant.robot
     positions = sampled_reference(robot, flight.mission_settings, GEARS_EVERY).joints[:, 0]
@@ -197,7 +197,7 @@ def _first_law(plan: Scenario) -> str:
     return names[0]
 
 
-def report_of(checks: Checked) -> dict[str, Any]:
+def gains_report(checks: CheckedGains) -> dict[str, Any]:
     """Return the results as data for JSON."""
     flight = checks.flight
     keys = ("robot", "mission", "case", "actuators", "gains")
@@ -219,7 +219,7 @@ def report_of(checks: Checked) -> dict[str, Any]:
     }
 
 
-def _law_entries(check: GainCheck, checks: Checked) -> Iterable[tuple[str, Any]]:
+def _law_entries(check: GainCheck, checks: CheckedGains) -> Iterable[tuple[str, Any]]:
     yield "is_stable", check.is_stable
     yield "is_sound", check.is_sound
     if spectrum := check.spectrum:
@@ -245,7 +245,7 @@ def _law_entries(check: GainCheck, checks: Checked) -> Iterable[tuple[str, Any]]
         yield "held_ripple", None if ripple is None else ripple.tolist()
 
 
-def print_checks(checks: Checked, console: Console) -> None:
+def print_checks(checks: CheckedGains, console: Console) -> None:
     """Print margins and noise gains with an explanation."""
     names = checks.flight.description
     say(
@@ -257,7 +257,7 @@ def print_checks(checks: Checked, console: Console) -> None:
         print_table(table, console)
 
 
-def _tables(checks: Checked) -> Iterator[Table]:
+def _tables(checks: CheckedGains) -> Iterator[Table]:
     if any(check.spectrum for check in checks.checks):
         yield _margins(checks)
         masses = {check.law: check.masses for check in checks.checks if check.masses}
@@ -293,7 +293,7 @@ def _table(
     return Table(title, [Column("", is_label=True), *columns], [Group(rows)], notes)
 
 
-def _margins(checks: Checked) -> Table:
+def _margins(checks: CheckedGains) -> Table:
     columns = [Column("smallest", spec=".4f"), Column("largest", spec=".4f")]
     columns += [Column("radius"), Column("margin")]
     rows = []
@@ -316,7 +316,7 @@ def _margins(checks: Checked) -> Table:
     return _table(title, columns, rows, *notes)
 
 
-def _loops(checks: Checked) -> Table:
+def _loops(checks: CheckedGains) -> Table:
     rows = []
     for check in checks.checks:
         margin: JudgedCell | None = None
@@ -333,7 +333,7 @@ def _loops(checks: Checked) -> Table:
     return _table(title, [Column("radius"), Column("margin")], rows, *notes)
 
 
-def _springs(checks: Checked) -> Table:
+def _springs(checks: CheckedGains) -> Table:
     columns = [Column("radius"), Column("largest\nbandwidth"), Column("largest\nh_bar", spec=".3g")]
     rows = []
     for check in checks.checks:
@@ -357,7 +357,11 @@ def _holds(text: str, value: bool) -> JudgedCell:
 
 
 def _by_axis(
-    title: str, checks: Checked, columns: Mapping[str, Array | None], prismatic: str, *notes: str
+    title: str,
+    checks: CheckedGains,
+    columns: Mapping[str, Array | None],
+    prismatic: str,
+    *notes: str,
 ) -> Table:
     """Return a column for each law; axes of prismatic joints with the unit of their own."""
     robot = checks.flight.robot

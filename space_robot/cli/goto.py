@@ -8,6 +8,7 @@ from typing import Any
 import click
 
 from .numbers import FiniteRange, NumberList
+from .sim import graph_options
 
 SECTION = "Fly"
 
@@ -48,12 +49,7 @@ def _attitude(
     type=FiniteRange(min=0.0, min_open=True),
     help="Seconds [default: as fast as the limits allow].",
 )
-@click.option(
-    "--domain",
-    type=click.IntRange(0, 232),
-    help="ROS domain [default: ROS_DOMAIN_ID, or that of the only plant here].",
-)
-@click.option("--namespace", default="", metavar="NS", help="Of the robot, as /sat1.")
+@graph_options
 def goto(domain: int | None, namespace: str, **options: Any) -> None:
     """Move the tool, the joints or the base of a robot that flies on a graph.
 

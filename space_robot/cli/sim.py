@@ -6,8 +6,6 @@ from typing import Any
 
 import click
 
-from .options import Decorator
-
 SECTION = "Fly"
 
 
@@ -25,30 +23,28 @@ def sim() -> None:
     """
 
 
-def where(function: Any) -> Any:
+def graph_options(function: Any) -> Any:
     """Give a command the options that select a graph."""
-    options: list[Decorator] = [
-        click.option(
-            "--domain",
-            type=click.IntRange(0, 232),
-            help="ROS domain [default: ROS_DOMAIN_ID, or that of the only plant here].",
-        ),
-        click.option("--namespace", default="", metavar="NS", help="Of the robot, as /sat1."),
-    ]
-    for option in reversed(options):
-        function = option(function)
-    return function
+    namespace = click.option(
+        "--namespace", default="", metavar="NS", help="Of the robot, as /sat1."
+    )
+    domain = click.option(
+        "--domain",
+        type=click.IntRange(0, 232),
+        help="ROS domain [default: ROS_DOMAIN_ID, or that of the only plant here].",
+    )
+    return domain(namespace(function))
 
 
 @sim.command()
-@where
+@graph_options
 def pause(**options: Any) -> None:
     """Hold the plant at its present tick; watchdogs ignore the pause."""
     _call("pause", **options)
 
 
 @sim.command()
-@where
+@graph_options
 def resume(**options: Any) -> None:
     """Resume a paused plant."""
     _call("resume", **options)
@@ -56,14 +52,14 @@ def resume(**options: Any) -> None:
 
 @sim.command()
 @click.option("--ticks", type=int, default=1, show_default=True, help="Ticks to go on.")
-@where
+@graph_options
 def step(**options: Any) -> None:
     """Advance a paused plant by some ticks; return when it is paused again."""
     _call("step", **options)
 
 
 @sim.command()
-@where
+@graph_options
 def reset(**options: Any) -> None:
     """Reset the whole graph to tick 0; a paused graph stays paused.
 

@@ -132,7 +132,7 @@ def view(
 
     from ..analysis import excerpt
     from ..analysis.plotted import parse_kinds
-    from ..console.files import check_writable, make_folder, whole_file
+    from ..console.files import atomic_file, check_writable, make_folder
     from ..console.progress import counting_progress
     from ..view.flights import ViewOptions, flights_page, remarks_on, shown_robot
     from ..view.stage import check_viser
@@ -160,7 +160,7 @@ def view(
     options = ViewOptions(side_by_side, rate, title, not light, kinds)
     with counting_progress("drawing") as advance:
         data = flights_page(logs, robots, options, advance).encode()
-    with whole_file(page, replace=True) as written:
+    with atomic_file(page, replace=True) as written:
         written.write(data)
     click.echo(f"wrote {page} ({page.stat().st_size / 1e6:.1f} MB)", err=True)
     if opens and not webbrowser.open(page.absolute().as_uri()):

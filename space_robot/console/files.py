@@ -63,15 +63,18 @@ def check_writable(path: Path) -> None:
 
 
 def write_text(text: str, path: Path, replace: bool = False) -> None:
-    """Write ``text`` in UTF-8, as a `whole_file`."""
-    with whole_file(path, replace) as file:
+    """Write ``text`` in UTF-8, as an `atomic_file`."""
+    with atomic_file(path, replace) as file:
         file.write(text.encode())
 
 
 @contextmanager
 def csv_writer(path: Path, replace: bool = False) -> Iterator[Any]:
-    """Open a `whole_file` for the writer of the module `csv`."""
-    with whole_file(path, replace) as raw, TextIOWrapper(raw, encoding="utf-8", newline="") as file:
+    """Open an `atomic_file` for the writer of the module `csv`."""
+    with (
+        atomic_file(path, replace) as raw,
+        TextIOWrapper(raw, encoding="utf-8", newline="") as file,
+    ):
         yield csv.writer(file, lineterminator="\n")
 
 
@@ -88,7 +91,7 @@ def csv_rows(integers: NDArray[np.int64], numbers: NDArray[np.float64]) -> list[
 
 
 @contextmanager
-def whole_file(path: Path, replace: bool = False) -> Iterator[IO[Any]]:
+def atomic_file(path: Path, replace: bool = False) -> Iterator[IO[Any]]:
     """Open a file that gets its name only when it is complete.
 
     Args:
@@ -118,7 +121,7 @@ def whole_file(path: Path, replace: bool = False) -> Iterator[IO[Any]]:
 
 
 @contextmanager
-def whole_folder(folder: Path) -> Iterator[Path]:
+def atomic_folder(folder: Path) -> Iterator[Path]:
     """Yield a temporary folder that replaces ``folder`` if the block ends without error.
 
     Raises:

@@ -6,7 +6,6 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
-from typing import Protocol
 
 from rich.progress import (
     BarColumn,
@@ -28,7 +27,7 @@ LINE_S = 60.0
 """Time between two lines in a file, where no line can be redrawn."""
 WATCH_S, WATCHED_LINE_S = 0.5, 5.0
 """Time between two counts of watched tasks, and between two lines about them."""
-COUNTS = "{task.completed:.0f}/{task.total:.0f}"
+DONE_OF_TOTAL = "{task.completed:.0f}/{task.total:.0f}"
 
 
 class FlightProgress:
@@ -66,24 +65,21 @@ def counting_progress(
     with ExitStack() as stack:
 
         def begin(total: int) -> Callable[[], None]:
-            progress = stack.enter_context(_bar(COUNTS, is_transient=is_transient))
+            progress = stack.enter_context(_bar(DONE_OF_TOTAL, is_transient=is_transient))
             task = progress.add_task(what, total=total)
             return lambda: progress.advance(task)
 
         yield begin
 
 
-class ShowCounts(Protocol):
-    """Shows the number of done tasks, the total number and a remark."""
-
-    def __call__(self, done: int, total: int, remark: str = "") -> None: ...  # noqa: D102
-
-
 @contextmanager
-def rated_progress(what: str, line_s: float = LINE_S) -> Iterator[ShowCounts]:
+def rated_progress(what: str, line_s: float = LINE_S) -> Iterator[Callable[..., None]]:
     """Show a progress line with rate and remaining time for many tasks, from the first call on.
 
     In a file, such as the log of a cluster job, it is a line every ``line_s`` seconds.
+
+    Yields:
+        A function of the number of done tasks, the total number, and a remark.
     """
     with ExitStack() as stack:
         progress: Progress | None = None
@@ -96,7 +92,7 @@ def rated_progress(what: str, line_s: float = LINE_S) -> Iterator[ShowCounts]:
                 say(console, ", ".join(filter(None, (f"{what} {done}/{total}", remark))))
             if progress is None:
                 remaining = TimeRemainingColumn(compact=True)
-                progress = stack.enter_context(_bar(COUNTS, _Rate(), remaining, _remark()))
+                progress = stack.enter_context(_bar(DONE_OF_TOTAL, _Rate(), remaining, _remark()))
                 progress.add_task(what, completed=done, total=total, remark=remark)
             else:
                 progress.update(progress.task_ids[0], completed=done, total=total, remark=remark)

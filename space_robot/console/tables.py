@@ -75,10 +75,10 @@ class Table:
     def texts(self, group: Group) -> Iterator[list[str]]:
         """Yield each row of a group as texts."""
         for row in group.rows:
-            yield [text_of(v, column) for v, column in zip(row, self.columns, strict=True)]
+            yield [cell_text(v, column) for v, column in zip(row, self.columns, strict=True)]
 
 
-def text_of(value: Value, column: Column) -> str:
+def cell_text(value: Value, column: Column) -> str:
     """Format a value as defined by its column."""
     if value is None:
         return NONE

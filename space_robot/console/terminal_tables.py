@@ -18,7 +18,7 @@ from rich.text import Text
 
 from space_robot_msgs_py.config.text import printable
 
-from .tables import Column, JudgedCell, Table, Value, text_of
+from .tables import Column, JudgedCell, Table, Value, cell_text
 from .terminal import say
 
 LONGEST_WORD = 24
@@ -68,10 +68,10 @@ def print_table(table: Table, console: Console, *, dense: bool = False) -> None:
             show_edge=not dense,
             width=sum(widths) + 3 * len(widths) + (-1 if dense else 1),
         )
-        for column, width in zip(part, widths, strict=True):
-            justify: Any = "left" if column.is_label else "right"
-            shown.add_column(column.heading, justify=justify, width=width, overflow="fold")
-        for number, row in enumerate(zip(*(column.cells for column in part), strict=True)):
+        for cells, width in zip(part, widths, strict=True):
+            justify: Any = "left" if cells.is_label else "right"
+            shown.add_column(cells.heading, justify=justify, width=width, overflow="fold")
+        for number, row in enumerate(zip(*(cells.cells for cells in part), strict=True)):
             shown.add_row(*row, end_section=number in ends)
         console.print(shown, crop=False)
     for note in table.notes:
@@ -94,7 +94,7 @@ def _cell(value: Value, column: Column) -> str | Text:
     if isinstance(value, JudgedCell):
         text = f"{value.text} " if value.text else ""
         return Text.assemble(text, (value.word, COLOUR_OF_TONE[value.tone]))
-    return text_of(value, column)
+    return cell_text(value, column)
 
 
 def _parts(columns: Sequence[_Cells], room: int) -> Iterator[tuple[Sequence[_Cells], list[int]]]:

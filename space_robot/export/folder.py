@@ -9,7 +9,7 @@ from space_robot_control.flight_code.folder import Exported
 from space_robot_control.flight_code.instances import write_sources
 from space_robot_msgs_py.errors import InputError
 
-from ..console.files import whole_folder
+from ..console.files import atomic_folder
 from .recorded import RecordedFlight
 from .verify import ReplayVerdict
 
@@ -49,7 +49,7 @@ def write_folder(
     Returns:
         Name, description and number of records of each flight.
     """
-    with whole_folder(folder.resolve()) as new:
+    with atomic_folder(folder.resolve()) as new:
         write_sources(new, exported.sources)
         acceptance = new / "acceptance"
         acceptance.mkdir()

@@ -45,8 +45,20 @@ def cells(results: Iterable[Result]) -> list[Cell]:
             for column, printed in zip(COLUMNS, PRINTED[row], strict=True):
                 measured = metrics[f"{column}.{definition}"] if metrics else None
                 ratio = None if measured is None else measured / printed
-                numbers = (measured, printed, ratio, diverged_tick)
-                compared.append(Cell(*row, *variant, definition, column, *numbers))
+                compared.append(
+                    Cell(
+                        row.controller,
+                        row.case,
+                        variant.gains,
+                        variant.friction,
+                        definition,
+                        column,
+                        measured,
+                        printed,
+                        ratio,
+                        diverged_tick,
+                    )
+                )
     return compared
 
 

@@ -130,7 +130,7 @@ def _write(
 ) -> dict[str, Any]:
     folder, comparison, chattering = figures.path.parent, cells(results), chatter(results)
     tables = [*variant_tables(comparison), chatter_table(chattering)]
-    record = {
+    record: dict[str, Any] = {
         "provenance": provenance,
         "claims": [claim.as_record() for claim in claims(results, comparison)],
         "cells": [cell._asdict() for cell in comparison],

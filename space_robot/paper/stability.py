@@ -302,7 +302,7 @@ def axis_conditions(
         Check(4.0 * k_2, k_1**2),
         Check(peak_gain(k_1, k_2), 1.0 / beta if beta > 0.0 else math.inf),
         Check(residual(m, k_1, k_2, beta=0.0, gamma=0.0), 0.0),
-        np.linalg.eigvalsh(m),
+        np.asarray(np.linalg.eigvalsh(m), dtype=np.float64),
         measured,
         assumed,
         initial,
@@ -357,10 +357,11 @@ def study(plan: Scenario, initial_error: float, fly: Fly) -> StabilityStudy:
     if log.telemetry is not None and {"k_1", "k_2"} <= gains.keys():
         off = fly(Flight(resolve(off_mission_plan(flight, initial_error))), "from an initial error")
         reached = reaching(off, gains["k_1"], ripple(log.telemetry[:, 0]))
-        columns = gains["k_1"], gains["k_2"], error.beta, derivative(off).beta
+        bounds = error.beta.tolist(), derivative(off).beta.tolist()
+        columns = gains["k_1"].tolist(), gains["k_2"].tolist(), *bounds
         axes = [
-            axis_conditions(*numbers, reached, axis)
-            for axis, numbers in enumerate(np.column_stack(columns).tolist())
+            axis_conditions(k_1, k_2, beta, reaching_beta, reached, axis)
+            for axis, (k_1, k_2, beta, reaching_beta) in enumerate(zip(*columns, strict=True))
         ]
         twisting = SuperTwisting(initial_error, reached, axes)
     lemma_1 = contraction(flight.plant.robot, h_bar, log)

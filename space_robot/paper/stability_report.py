@@ -94,7 +94,7 @@ def print_study(study: StabilityStudy, console: Console) -> None:
         f"joint friction {'on' if flight.scenario.has_friction else 'off'}",
     )
     print_table(_lemma_1(study), console)
-    columns = [
+    columns: list[tuple[str, Iterable[Value]]] = [
         ("max |eps|", map(_number, study.error.max_error)),
         ("beta", map(_number, study.error.beta)),
         ("at t (s)", map("{:.4f}".format, study.error.beta_at_s)),

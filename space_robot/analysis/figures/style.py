@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 from space_robot_msgs_py.config.text import shortened
 from space_robot_msgs_py.errors import InputError
 
-from ...console.files import make_folder, whole_file
+from ...console.files import atomic_file, make_folder
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
@@ -258,7 +258,7 @@ def save_figure(figure: Figure, stem: Path, *, png: bool = True) -> tuple[Path, 
         files = []
         for format in ("png", "svg") if png else ("svg",):
             path = stem.with_name(f"{stem.name}.{format}")
-            with whole_file(path, replace=True) as file:
+            with atomic_file(path, replace=True) as file:
                 _print(figure, file, format)
             files.append(path)
     return tuple(files)

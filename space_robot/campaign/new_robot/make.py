@@ -29,7 +29,7 @@ from space_robot_sim.environment.environment import EnvironmentSettings
 from ...analysis import measure
 from ...analysis.measure import column_unit
 from ...analysis.words import of_statistic
-from ...console.files import whole_folder
+from ...console.files import atomic_folder
 from ...flight.plan import Flight, Scenario, resolve
 from ...flight.simulate import simulate
 from ...processes.pool import cores, run_all
@@ -198,7 +198,7 @@ def make_robot(
     Raises:
         InputError: no mission is possible, or the folder cannot be written.
     """
-    with whole_folder(folder) as place:
+    with atomic_folder(folder) as place:
         for name, text in files.items():
             (place / name).write_text(text, "utf-8")
         (place / CAMPAIGN_FILE).write_text(campaign_text(folder, command), "utf-8")

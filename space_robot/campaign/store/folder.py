@@ -12,7 +12,7 @@ from typing import Any
 from space_robot_msgs_py.config.validation import short
 from space_robot_msgs_py.errors import InputError
 
-from ...console.files import make_folder, whole_file
+from ...console.files import atomic_file, make_folder
 from ..study import read_study
 from .journal_codec import JournalCodec
 from .journal_file import whole_rows
@@ -96,7 +96,7 @@ def begin_or_resume(folder: Path, manifest: Manifest, study_text: str) -> list[s
         if changes := study_changes(study, manifest.study):
             rows.append(changes)
     if not is_begun or not study.exists():
-        with whole_file(study, replace=True) as file:
+        with atomic_file(study, replace=True) as file:
             file.write(study_text.encode())
     manifest.write(folder / MANIFEST)  # last: it marks the folder as a campaign
     return rows

@@ -15,7 +15,7 @@ from space_robot_msgs_py.config.validation import StrictModel, short, validate
 from space_robot_msgs_py.config.yaml_text import read_file
 from space_robot_msgs_py.errors import InputError
 
-from ...console.files import whole_file
+from ...console.files import atomic_file
 from ..study import NOT_TO_BE_EXTENDED
 from .schema import Schema
 
@@ -67,7 +67,7 @@ class Manifest(StrictModel):
         """
         content = self.model_dump()
         text = json.dumps({**content, SHA256: _digest(content)}, indent=1)
-        with whole_file(path, replace=True) as file:
+        with atomic_file(path, replace=True) as file:
             file.write(text.encode() + b"\n")
 
     def check_same(self, other: Manifest, where: Path) -> None:

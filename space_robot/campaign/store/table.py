@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 from space_robot_msgs_py.config.installation import install_command
 from space_robot_msgs_py.errors import InputError
 
-from ...console.files import whole_file
+from ...console.files import atomic_file
 from ..row.row import Row
 from .schema import Kind, Schema
 
@@ -64,7 +64,7 @@ def write_table(path: Path, schema: Schema, campaign: str, rows: Iterable[Row]) 
     columns = _arrow_schema(schema)
     remaining = iter(rows)
     with (
-        whole_file(path, replace=True) as file,
+        atomic_file(path, replace=True) as file,
         ParquetWriter(
             file,
             columns,
@@ -78,7 +78,7 @@ def write_table(path: Path, schema: Schema, campaign: str, rows: Iterable[Row]) 
         while group := list(itertools.islice(remaining, ROW_GROUP)):
             writer.write_batch(_batch(group, schema, columns), row_group_size=ROW_GROUP)
     digest = file_digest(path)
-    with whole_file(_digest_of(path), replace=True) as file:
+    with atomic_file(_digest_of(path), replace=True) as file:
         file.write(_digest_text(path, campaign, digest).encode())
     return digest
 

@@ -28,7 +28,7 @@ from space_robot.analysis.export import (
 from space_robot.analysis.own_metric import SESSION, call, check_names, function_of, parse, text_of
 from space_robot.analysis.page import render
 from space_robot.cli.main import cli
-from space_robot.console.files import whole_file
+from space_robot.console.files import atomic_file
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.samples import RobotNames, Timebase
@@ -130,7 +130,7 @@ def test_a_file_that_came_while_ours_was_written_stays(log: FlightLog, tmp_path:
     path = tmp_path / "x"
 
     def write() -> None:
-        with whole_file(path) as file:
+        with atomic_file(path) as file:
             file.write(b"ours")
             path.write_text("theirs")
 

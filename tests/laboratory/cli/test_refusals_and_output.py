@@ -19,7 +19,7 @@ from flights import space_robot as started
 from paths import CONFIG, DATA
 from robots import driven_paper
 
-from space_robot.console.files import ABANDONED_S, whole_file, whole_folder
+from space_robot.console.files import ABANDONED_S, atomic_file, atomic_folder
 from space_robot.flight.plan import Flight, Scenario, resolve
 from space_robot.flight.simulate import simulate
 from space_robot_model.robot.parts import MOST_PLATES
@@ -189,7 +189,7 @@ def test_an_older_file_stays_whole_if_the_new_one_fails(tmp_path: Path) -> None:
     path.write_text("older")
 
     def fail() -> None:
-        with whole_file(path, replace=True) as file:
+        with atomic_file(path, replace=True) as file:
             file.write(b"half")
             raise OSError(28, "No space left on device")
 
@@ -197,7 +197,7 @@ def test_an_older_file_stays_whole_if_the_new_one_fails(tmp_path: Path) -> None:
         fail()
     assert path.read_text() == "older"
     assert list(tmp_path.iterdir()) == [path]
-    with whole_file(path, replace=True) as f:
+    with atomic_file(path, replace=True) as f:
         f.write(b"newer")
     assert path.read_text() == "newer"
 
@@ -234,7 +234,7 @@ def test_what_a_killed_process_has_left_is_removed_by_the_next_one(
     for path in (left, folder, other):
         before = path.stat().st_mtime - 2.0 * ABANDONED_S
         os.utime(path, (before, before))
-    with whole_file(tmp_path / name) as file:
+    with atomic_file(tmp_path / name) as file:
         file.write(b"whole")
     assert (tmp_path / name).read_text("utf-8") == "whole"
     assert sorted(tmp_path.iterdir()) == sorted([tmp_path / name, new, other])
@@ -242,11 +242,11 @@ def test_what_a_killed_process_has_left_is_removed_by_the_next_one(
 
 def test_a_folder_appears_whole_or_not_at_all(tmp_path: Path) -> None:
     folder = tmp_path / "one"
-    with pytest.raises(InputError, match="cannot be written"), whole_folder(folder) as place:
+    with pytest.raises(InputError, match="cannot be written"), atomic_folder(folder) as place:
         (place / "a").rename(place / "b")
     assert not [*tmp_path.iterdir()]
     for text in ("1", "2"):
-        with whole_folder(folder) as place:
+        with atomic_folder(folder) as place:
             (place / "a").write_text(text, "utf-8")
     assert [path.name for path in tmp_path.iterdir()] == ["one"]
     assert (folder / "a").read_text("utf-8") == "2"

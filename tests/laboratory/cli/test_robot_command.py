@@ -176,6 +176,7 @@ def test_base_and_repair_are_a_part_of_the_name(
         assert f"`space-robot new {bad} --base fore --repair`" in capsys.readouterr().err
         assert _run([*command, "--robot", str(bad), "--base", "fore"]) == 2
         assert "triangle" in capsys.readouterr().err
+    assert report(f"{bad}?base=fore&repair") == report(bad, "--base", "fore", "--repair")
     assert _run(["simulate", "--base", "fore"]) == 2
     assert "not a URDF" in capsys.readouterr().err
 
