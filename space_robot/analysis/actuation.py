@@ -11,7 +11,7 @@ from space_robot_msgs_py.errors import InputError
 
 from .analysed_log import AnalysedLog
 from .described import NO_LIMITS, torque_limits
-from .generalised_motion import measured_rows
+from .errors import measured_rows
 from .series import Definition, TimeSeries, metrics, series
 
 Array = NDArray[np.float64]

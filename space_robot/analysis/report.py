@@ -9,11 +9,10 @@ from space_robot_msgs_py.bag.law_history import as_data, laws_of
 from space_robot_msgs_py.config.validation import short
 from space_robot_msgs_py.errors import InputError
 
-from .analysed_log import AnalysedLog
+from .analysed_log import AnalysedLog, PointingBudget, pointed_axis, pointing_of
 from .described import actuators_of, event_labels, navigation_of, sensors_of, start_step_of
 from .errors import UNAVAILABLE
 from .measure import evaluate
-from .pointing_budget import PointingBudget, pointed_axis, pointing_of
 from .sizing import ActuatorSet, sizing
 
 DESCRIBED = ("controller", "case", "gains", "robot")

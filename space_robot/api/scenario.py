@@ -19,8 +19,7 @@ from ..flight.compilation import compile_kernels
 from ..flight.plan import Flight, resolve
 from ..scenario.options import FlightPlan
 from .bench import Bench
-from .flown_flight import FlownFlight
-from .in_process import fly_with_progress
+from .flown_flight import FlownFlight, fly_with_progress
 from .options_html import options_html
 
 OF_THE_GRAPH = (

@@ -7,8 +7,7 @@ from rich.console import Console
 from ..console.tables import Column, JudgedCell, Table
 from ..console.terminal import say
 from ..console.terminal_tables import print_table
-from ..tuning.mass_errors import DRAWS
-from ..tuning.spectrum import LEAST_MARGIN
+from ..tuning.spectrum import DRAWS, LEAST_MARGIN
 from .gains_checked import Checked
 
 

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..analysis.template import template
+from ..analysis.page import template
 from .arrows import ArrowKind
 from .marks import Mark
 from .plots import Plot

@@ -18,8 +18,7 @@ from space_robot_model.hardware.base_actuators import (
 from space_robot_msgs_py.bag.flight_log import FlightLog
 
 from ..actuation import deflection
-from ..errors import attitude_angles
-from ..generalised_motion import relative_rate
+from ..errors import attitude_angles, relative_rate
 from ..momentum import Momentum
 from .single_flight import BASE_AXES
 from .style import GREY, LineStyle, house_style, legend_above, page, plot_lines

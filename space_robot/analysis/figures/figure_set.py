@@ -15,10 +15,10 @@ from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.bag.law_history import as_data, laws_of
 from space_robot_msgs_py.errors import InputError
 
+from ..analysed_log import PointingBudget
 from ..described import flown_actuators
 from ..external_torques import torques_by_source
 from ..momentum import momentum_of
-from ..pointing_budget import PointingBudget
 from ..words import flown
 from .base_actuators import deflections, momentum, thrusters, torques_from_outside, wheels
 from .base_torque import chatter, junctions

@@ -12,10 +12,9 @@ from typing_extensions import Self
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.errors import InputError
 
-from ..analysed_log import AnalysedLog
+from ..analysed_log import AnalysedLog, PointingBudget
 from ..described import event_times
 from ..errors import AxisIndex, controls_base
-from ..pointing_budget import PointingBudget
 from ..series import GROUPS, SeriesGroup
 from ..torques import RippleSpectrum, ripple_spectrum
 from ..waypoints import junction_ticks

@@ -8,7 +8,7 @@ from tempfile import TemporaryDirectory
 
 from ...analysis.figures.figure_set import SavedFigure
 from ...analysis.figures.style import save_figure
-from ...analysis.template import template
+from ...analysis.page import template
 from ...console.tables import Table
 from .figures import drawings
 from .findings import Findings

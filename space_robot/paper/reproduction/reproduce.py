@@ -14,7 +14,7 @@ from space_robot_msgs_py.config.installation import config_directory
 from space_robot_msgs_py.errors import InputError
 
 from ...analysis.figures.figure_set import FigureFolder
-from ...analysis.template import template
+from ...analysis.page import template
 from ...console.tables import as_csv, as_markdown, as_records
 from ...flight.plan import Flight, FlightPlan, resolve
 from ...processes.pool import run_all

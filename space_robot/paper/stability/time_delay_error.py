@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from space_robot_msgs_py.bag.flight_log import FlightLog
 
-from ...analysis.generalised_motion import neglected_force
+from ...analysis.errors import neglected_force
 
 Array = NDArray[np.float64]
 

@@ -13,7 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from rich.table import Table as RichTable
 
-from space_robot.analysis.template import template
+from space_robot.analysis.page import template
 from space_robot.console import progress
 from space_robot.console.progress import WATCHER
 from space_robot.console.table_layout import LONGEST_WORD

@@ -15,8 +15,7 @@ from ..flight.batch.compilation import compile_lanes
 from ..flight.batch.sharing import batches
 from ..flight.compilation import compile_kernels
 from ..flight.plan import Flight
-from .flown_flight import FlownFlight
-from .in_process import fly_in_process
+from .flown_flight import FlownFlight, fly_in_process
 from .scenario import Scenario
 
 
