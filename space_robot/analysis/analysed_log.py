@@ -105,10 +105,21 @@ ANGLES = ("half_cone", "about_axis", "base_rotation")
 class AnalysedLog:
     """A flight log without gaps, as the metrics see it; a flight need not have been flown."""
 
-    def __init__(self, log: FlightLog, budget: PointingBudget | None = None) -> None:
-        """``budget``: of the base's pointing; None: the default."""
+    def __init__(
+        self,
+        log: FlightLog,
+        budget: PointingBudget | None = None,
+        other_actuators: BaseActuatorSettings | None = None,
+    ) -> None:
+        """Store the log.
+
+        Args:
+            log: of the flight.
+            budget: of the base's pointing; None: the default.
+            other_actuators: for the sizing, in the place of those that flew.
+        """
         self.log = log
-        self._budget = budget
+        self._budget, self.other_actuators = budget, other_actuators
         self.values: dict[str, Array] = {}
         """Values of series that fit into one block, by the series' name."""
 
@@ -168,14 +179,18 @@ class AnalysedLog:
     def parts(self, place: str) -> list[str]:
         """Return the names that a place in a metric's name stands for, see `series.expand`."""
         log = self.log
+        wheels = [f"wheel_{i + 1}" for i in range(log.wheel_velocities.shape[1])]
+        if place == "event":
+            return described.event_labels(log)
         names: dict[str, Iterable[str]] = {
             "error": self.error_columns,
             "torque": self.torque_columns,
             "axis": self.axis_names,
+            "base_axis": BASE_AXES,
+            "base_part": [*BASE_AXES, *wheels],
             "joint": log.joint_names,
-            "wheel": [f"wheel_{i + 1}" for i in range(log.wheel_velocities.shape[1])],
+            "wheel": wheels,
             "angle": ANGLES,
-            "event": () if place != "event" else described.event_labels(log),
         }
         return list(names[place])
 
@@ -187,7 +202,8 @@ class AnalysedLog:
         """Return the rows in a window as a flight of their own."""
         if window == range(self.log.ticks):
             return self
-        return AnalysedLog(self.log.rows(window.start, window.stop), self._budget)
+        rows = self.log.rows(window.start, window.stop)
+        return AnalysedLog(rows, self._budget, self.other_actuators)
 
     def attitude_errors(self, start: int, stop: int) -> Array:
         """Return the `attitude_error` of some rows; of a short flight computed once."""

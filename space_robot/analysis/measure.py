@@ -29,6 +29,7 @@ MODULES = (
     "tool_path",
     "momentum",
     "external_torques",
+    "sizing",
 )
 """Modules with metrics, in the order of reports."""
 for _module in MODULES:

@@ -8,6 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from space_robot_msgs_py.topics import BASE_AXES
+
 from ..console.tables import NONE, Column, Group, JudgedCell, Row, Table
 from .described import IDEAL
 from .measure import column_unit, describe, group_of
@@ -101,7 +103,9 @@ def comparison_table(reports: Mapping[str, Report]) -> Table:
         flights.append(["share analyzed", *(f"{r['ticks'] / r['flight_ticks']:.1%}" for r in each)])
     columns = Column(is_label=True), *(Column(name) for name in reports)
     groups = _groups(each, shown_names(each))
-    return Table("", columns, [Group(flights, "flight"), *groups, *_asked(each), *_recording(each)])
+    return Table(
+        "", columns, [Group(flights, "flight"), *groups, *_demand_on_axes(each), *_recording(each)]
+    )
 
 
 def shown_names(reports: Sequence[Report]) -> list[str]:
@@ -147,17 +151,14 @@ def _is_of_table_v(name: str, report: Report) -> bool:
     return name.rpartition(".")[0] in table_v_columns(report["metrics"])
 
 
-def _asked(reports: Sequence[Report]) -> list[Group]:
-    """Return what was asked of each axis of the base."""
+def _demand_on_axes(reports: Sequence[Report]) -> list[Group]:
     rows = []
-    axes = dict.fromkeys(axis for r in reports if r["sizing"] for axis in r["sizing"]["axes"])
-    for key, name in (
-        ("peak_torque_n_m", "torque (N m)"),
-        ("peak_momentum_n_m_s", "momentum (N m s)"),
-    ):
-        for axis in axes:
-            each = [r["sizing"]["axes"][axis][key] if r["sizing"] else None for r in reports]
-            rows.append([f"{axis} {name}", *(NONE if v is None else f"{v:.4g}" for v in each)])
+    for key, name in (("peak_torque", "torque (N m)"), ("peak_momentum", "momentum (N m s)")):
+        for axis in BASE_AXES:
+            each = [report["metrics"].get(f"sizing.{axis}.{key}") for report in reports]
+            if any(value is not None for value in each):
+                values = (NONE if value is None else f"{value:.4g}" for value in each)
+                rows.append([f"{axis} {name}", *values])
     note = "largest torque commanded, and momentum that wheels have to hold for it"
     return [Group(rows, "asked of the base", note)] if rows else []
 
@@ -179,12 +180,12 @@ def _errors_of(report: Report) -> str:
 
 
 BY_AXIS = (
-    ("peak torque", "N m", "peak_torque_n_m"),
-    ("RMS torque", "N m", "rms_torque_n_m"),
-    ("angular impulse", "N m s", "angular_impulse_n_m_s"),
-    ("stored momentum", "N m s", "peak_momentum_n_m_s"),
+    ("peak torque", "N m", "peak_torque"),
+    ("RMS torque", "N m", "rms_torque"),
+    ("angular impulse", "N m s", "angular_impulse"),
+    ("stored momentum", "N m s", "peak_momentum"),
     ("pulses", "-", "pulses"),
-    ("propellant", "kg", "propellant_kg"),
+    ("propellant", "kg", "propellant"),
 )
 """Definition, unit and key of what is asked of each axis."""
 
@@ -200,13 +201,11 @@ def sizing_table(report: Report) -> Table | None:
     requirements = sizing["requirements"]
     parts = groupby(requirements, key=lambda requirement: requirement["part"])
     judged = {(r["part"], r["quantity"]): r for r in requirements}
-    groups = [
-        Group(list(_of_axis(name, axis, judged)), name) for name, axis in sizing["axes"].items()
-    ]
+    groups = [Group(list(_axis_rows(axis, report["metrics"], judged)), axis) for axis in BASE_AXES]
     groups += [
         Group([_row(r["quantity"], r["unit"], r["asked"], r) for r in each], part)
         for part, each in parts
-        if part not in sizing["axes"]
+        if part not in BASE_AXES
     ]
     columns = (
         Column(is_label=True),
@@ -218,10 +217,12 @@ def sizing_table(report: Report) -> Table | None:
     return Table(_title(sizing), columns, rows, _notes(report))
 
 
-def _of_axis(name: str, axis: dict[str, Any], judged: dict[tuple[str, str], Any]) -> Iterator[Row]:
+def _axis_rows(
+    axis: str, metrics: Mapping[str, float], judged: Mapping[tuple[str, str], Any]
+) -> Iterator[Row]:
     for quantity, unit, key in BY_AXIS:
-        if axis[key] is not None:
-            yield _row(quantity, unit, axis[key], judged.get((name, quantity)))
+        if (asked := metrics.get(f"sizing.{axis}.{key}")) is not None:
+            yield _row(quantity, unit, asked, judged.get((axis, quantity)))
 
 
 def _row(quantity: str, unit: str, asked: float, judged: dict[str, Any] | None) -> Row:

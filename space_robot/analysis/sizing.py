@@ -7,7 +7,7 @@ tells what wheels would hold.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -33,8 +33,8 @@ from ..flight.capability import (
 )
 from .actuation import ROUNDING, wheel_motion
 from .analysed_log import AnalysedLog
-from .described import actuators_of
 from .external_torques import axes_of
+from .series import Definition, metrics
 
 Array = NDArray[np.float64]
 
@@ -47,14 +47,46 @@ class ActuatorSet(NamedTuple):
     settings: BaseActuatorSettings
 
 
-def sizing(flight: AnalysedLog, other: ActuatorSet | None = None) -> dict[str, Any]:
-    """Return the demand on each axis, and whether the parts of a set have what is asked of them.
-
-    ``requirements`` is empty where there is no set; ``has`` is None where it has no limit.
-
-    Args:
-        flight: that was flown.
-        other: actuators to ask about in the place of those that flew.
+@metrics(
+    "sizing",
+    {
+        "sizing.{base_part}.peak_torque": Definition(
+            "N m",
+            "largest torque commanded about an axis of the base, or of a wheel's motor",
+            is_shown=False,
+        ),
+        "sizing.{base_part}.peak_momentum": Definition(
+            "N m s",
+            "largest momentum that wheels have to hold about an axis, or a wheel holds",
+            is_shown=False,
+        ),
+        "sizing.{base_axis}.rms_torque": Definition(
+            "N m", "RMS of the torque commanded", is_shown=False
+        ),
+        "sizing.{base_axis}.angular_impulse": Definition(
+            "N m s", "integral of the size of the torque commanded", is_shown=False
+        ),
+        "sizing.{base_axis}.pulses": Definition(
+            "", "pulses of the thrusters that turn the base about this axis most", is_shown=False
+        ),
+        "sizing.{base_axis}.propellant": Definition(
+            "kg", "propellant for this axis", is_shown=False
+        ),
+        "sizing.peak_momentum": Definition(
+            "N m s", "largest momentum that wheels have to hold", is_shown=False
+        ),
+        "sizing.thrusters.torque_share": Definition(
+            "share",
+            "largest share of the torque that thrusters without wheels can give",
+            is_shown=False,
+        ),
+        "sizing.thrusters.propellant": Definition(
+            "kg", "propellant of all thrusters", is_shown=False
+        ),
+    },
+)
+def sizing(flight: AnalysedLog) -> dict[str, float]:
+    """Compute the demand on each axis of the base, and on each part of a set of actuators.
 
     Raises:
         InputError: the base floated freely, or what turned it is not known.
@@ -62,65 +94,63 @@ def sizing(flight: AnalysedLog, other: ActuatorSet | None = None) -> dict[str, A
     log, flown = flight.log, flight.actuators
     if not flown.controls_base:
         raise InputError("the base floated freely: nothing was asked of it")
-    name, asked = other or ActuatorSet(actuators_of(log), flown)
-    is_flown = other is None
-    wheels = [WheelLoad(asked.wheels, log, is_flown)] if asked.wheel_count else []
-    thrusters = None
-    if asked.thruster_count:
-        thrusters = ThrusterLoad(asked.thrusters, log, not asked.wheel_count, is_flown)
-    loads: list[WheelLoad | ThrusterLoad] = [*wheels, *([thrusters] if thrusters else [])]
+    actuators, is_flown = flight.other_actuators or flown, flight.other_actuators is None
+    loads: list[WheelLoad | ThrusterLoad] = []
+    if actuators.wheel_count:
+        loads.append(WheelLoad(actuators.wheels, log, is_flown))
+    if actuators.thruster_count:
+        are_alone = not actuators.wheel_count
+        loads.append(ThrusterLoad(actuators.thrusters, log, are_alone, is_flown))
     demands, squares = BaseDemand(log, flown), np.zeros(3)
     torque, momentum, impulse, largest = np.zeros(3), np.zeros(3), np.zeros(3), 0.0
-    period = log.timebase.period
     for start, stop in flight.blocks():
         demand = demands.of(start, stop)
         squares += np.einsum("ij,ij->j", demand.torque, demand.torque)
         torque = np.maximum(torque, np.abs(demand.torque).max(axis=0))
         momentum = np.maximum(momentum, np.abs(demand.momentum).max(axis=0))
-        impulse += period * np.sum(np.abs(demand.torque), axis=0)
+        impulse += flight.period * np.sum(np.abs(demand.torque), axis=0)
         largest = max(largest, float(np.linalg.norm(demand.momentum, axis=1).max()))
         for load in loads:
             load.add(start, stop, demand)
-    pulses = thrusters.pulses() if thrusters else None
-    propellant = thrusters.propellant(period) if thrusters else None
-    requirements = _requirements(asked, torque, momentum, loads, period)
-    return {
-        "actuators": name,
-        "flown": is_flown,
-        "axes": {
-            axis: {
-                "peak_torque_n_m": float(torque[i]),
-                "rms_torque_n_m": float(np.sqrt(squares[i] / log.ticks)),
-                "angular_impulse_n_m_s": float(impulse[i]),
-                "peak_momentum_n_m_s": float(momentum[i]),
-                "pulses": None if pulses is None else int(pulses[i]),
-                "propellant_kg": None if propellant is None else float(propellant[i]),
-            }
-            for i, axis in enumerate(BASE_AXES)
-        },
-        "peak_momentum_n_m_s": largest,
-        "requirements": [requirement.as_data() for requirement in requirements],
-    }
-
-
-def _requirements(
-    asked: BaseActuatorSettings,
-    torque: Array,
-    momentum: Array,
-    loads: Sequence[WheelLoad | ThrusterLoad],
-    period: float,
-) -> Iterator[LoadRequirement]:
-    if not loads:
-        return
-    by_axis = [("peak torque", "N m", torque, largest_torque(asked))]
-    if asked.wheel_count:
-        held = largest_momentum(asked.wheels)
-        by_axis.append(("stored momentum", "N m s", momentum, held))
-    for quantity, unit, values, limits in by_axis:
-        for axis, value, limit in zip(BASE_AXES, values.tolist(), limits, strict=True):
-            yield LoadRequirement(axis, quantity, unit, value, float(limit))
+    numbers = {"peak_momentum": largest}
+    for i, axis in enumerate(BASE_AXES):
+        numbers |= {
+            f"{axis}.peak_torque": float(torque[i]),
+            f"{axis}.rms_torque": float(np.sqrt(squares[i] / log.ticks)),
+            f"{axis}.angular_impulse": float(impulse[i]),
+            f"{axis}.peak_momentum": float(momentum[i]),
+        }
     for load in loads:
-        yield from load.requirements(period)
+        numbers |= load.numbers(flight.period)
+    return {f"sizing.{name}": value for name, value in numbers.items()}
+
+
+def requirements(
+    actuators: BaseActuatorSettings, numbers: Mapping[str, float]
+) -> Iterator[LoadRequirement]:
+    """Yield what is asked of each part of actuators by the metrics, and what the part has."""
+
+    def asked(part: str, key: str, quantity: str, unit: str, has: float) -> LoadRequirement:
+        return LoadRequirement(part, quantity, unit, numbers[f"sizing.{part}.{key}"], has)
+
+    wheels, thrusters = actuators.wheels, actuators.thrusters
+    if not (wheels.count or thrusters.count):
+        return
+    for axis, has in zip(BASE_AXES, largest_torque(actuators), strict=True):
+        yield asked(axis, "peak_torque", "peak torque", "N m", float(has))
+    if wheels.count:
+        for axis, has in zip(BASE_AXES, largest_momentum(wheels), strict=True):
+            yield asked(axis, "peak_momentum", "stored momentum", "N m s", float(has))
+    limits = wheels.limits("max_torque"), wheels.limits("max_momentum")
+    for i, (torque, momentum) in enumerate(zip(*limits, strict=True)):
+        part = f"wheel_{i + 1}"
+        yield asked(part, "peak_torque", "peak torque", "N m", float(torque))
+        yield asked(part, "peak_momentum", "largest momentum", "N m s", float(momentum))
+    if thrusters.count and not wheels.count:
+        yield asked("thrusters", "torque_share", "share of their torque", "-", 1.0)
+    if "sizing.thrusters.propellant" in numbers:
+        tank = thrusters.propellant or np.inf
+        yield asked("thrusters", "propellant", "propellant", "kg", tank)
 
 
 class BaseDemand:
@@ -263,17 +293,13 @@ class WheelLoad:
         torque, held = wheel_loads(self._wheels, demand.torque, momentum, demand.omega)
         return torque, held
 
-    def requirements(self, period: float) -> list[LoadRequirement]:
-        """Return torque and momentum of every wheel."""
-        kinds = (("peak torque", "N m", "torque"), ("largest momentum", "N m s", "momentum"))
-        limits = [self._wheels.limits(f"max_{key}") for _, _, key in kinds]
-        return [
-            LoadRequirement(
-                f"wheel_{i + 1}", kind, unit, float(self._largest[k, i]), float(limits[k][i])
-            )
-            for i in range(self._wheels.count)
-            for k, (kind, unit, _) in enumerate(kinds)
-        ]
+    def numbers(self, period: float) -> dict[str, float]:
+        """Return the metrics of every wheel."""
+        return {
+            f"wheel_{i + 1}.{key}": float(value)
+            for key, values in zip(("peak_torque", "peak_momentum"), self._largest, strict=True)
+            for i, value in enumerate(values)
+        }
 
 
 class ThrusterLoad:
@@ -312,26 +338,21 @@ class ThrusterLoad:
                 alone[:, i] = demand.torque[:, i]
                 self._rate_of_axes[i] += float(np.sum(self._torques.propellant(alone)))
 
-    def requirements(self, period: float) -> list[LoadRequirement]:
-        """Return what is asked of all together."""
-        requirements = []
-        if self._torques:
-            requirements.append(
-                LoadRequirement("thrusters", "share of their torque", "-", self._share, 1.0)
-            )
+    def numbers(self, period: float) -> dict[str, float]:
+        """Return the metrics of all thrusters; ticks are ``period`` s apart.
+
+        A pulse counts for the axis that its thruster turns the base about most, the propellant of a
+        thruster for all axes, as its torque does.
+        """
+        numbers = {"thrusters.torque_share": self._share} if self._torques else {}
         if self._rate_of_axes is not None:
-            tank = self._thrusters.propellant or np.inf
-            mass = period * self._rate
-            requirements.append(LoadRequirement("thrusters", "propellant", "kg", mass, tank))
-        return requirements
-
-    def pulses(self) -> NDArray[np.intp] | None:
-        """(3,) of each axis: a pulse counts for the one that it turns the base about most."""
-        return self._pulses if self._is_flown else None
-
-    def propellant(self, period: float) -> Array | None:
-        """(3,) kg of each axis: that of a thruster goes to all, as its torque does."""
-        return None if self._rate_of_axes is None else period * self._rate_of_axes
+            numbers["thrusters.propellant"] = period * self._rate
+            for axis, rate in zip(BASE_AXES, self._rate_of_axes.tolist(), strict=True):
+                numbers[f"{axis}.propellant"] = period * rate
+        if self._is_flown:
+            for axis, pulses in zip(BASE_AXES, self._pulses.tolist(), strict=True):
+                numbers[f"{axis}.pulses"] = float(pulses)
+        return numbers
 
     def _flown(self, start: int, stop: int) -> Array:
         """Count pulses; return the mass flow (T,) of each thruster, summed up over the ticks."""
