@@ -37,7 +37,7 @@ def main(out: str | None = None) -> None:
     held = Scenario(controller="tde_stc", case="1").fly()
     print(f"tde_stc holds the base: {base_motion(held)}")
     torque_nm = held.metrics["base_torque.max"]
-    momentum_nms = held.report()["sizing"]["peak_momentum_n_m_s"]
+    momentum_nms = held.metrics["sizing.peak_momentum"]
     print(
         f"to hold it took up to {torque_nm:.2f} N m, "
         f"and wheels would have to take up {momentum_nms:.1f} N m s"

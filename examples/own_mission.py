@@ -37,7 +37,7 @@ def main() -> None:
     for seconds in (20.0, 10.0):
         flight = fly_in(seconds)
         torques.append(flight.metrics["base_torque.max"])
-        momenta.append(flight.report()["sizing"]["peak_momentum_n_m_s"])
+        momenta.append(flight.metrics["sizing.peak_momentum"])
         print(
             f"{seconds:.0f} s: base torque {torques[-1]:5.2f} N m, "
             f"momentum {momenta[-1]:4.1f} N m s"

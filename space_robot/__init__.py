@@ -3,10 +3,25 @@
     import space_robot as sr
 
     flight = sr.Scenario(controller="tde_stc", case="3", sensors="fine").fly()
+    flight.metrics["joints_1_3.rms"], flight.plot(), flight.view()
     sr.Campaign.load("my.yaml").run(runs=1000, seed=7, out="campaigns/a").verdicts
     sr.replay("flights/one").has_passed
 
-The names below are the interface for people; they are imported when they are used.
+| name | what it is |
+|---|---|
+| `Scenario` | robot, mission, law, gains, sensors, faults: what `fly` takes, and `Scenario.bench` |
+| `FlownFlight` | a flight: `log`, `metrics`, `report`, `table`, `plot`, `view`, `save` |
+| `fly_many`, `bench_many` | many scenarios at once, eight in the lanes of a processor |
+| `Bench` | a flight step by step, under torques of your own |
+| `load_bag` | a recorded flight as arrays, for `space_robot.analysis.analyze` and `measure` |
+| `replay` | the recorded states once more, answered by flight software and compared |
+| `Campaign`, `FlownCampaign` | flights with drawn parameters, and verdicts on requirements |
+| `make`, `make_vec` | environments of Gymnasium, for learning |
+| `Robot` | links, joints, masses, of YAML or URDF |
+| `mass_matrix`, `bias_force`, `forward_dynamics` | the dynamics of a `Robot` |
+| `sampled` | a disturbance as a function of time, for `Scenario` |
+
+These names are the interface for people; they are imported when they are used.
 """
 
 from __future__ import annotations
@@ -20,8 +35,8 @@ if TYPE_CHECKING:
 
     from .analysis.load_bag import load_bag
     from .api import Bench, FlownFlight, Scenario
+    from .api.fly_many import bench_many, fly_many
     from .api.replayed import replay
-    from .api.together import bench_many, fly_many
     from .campaign.flown import Campaign, FlownCampaign
     from .learning import make, make_vec
     from .scenario.disturbances import sampled
@@ -53,9 +68,9 @@ MODULES = {
     "FlownFlight": "space_robot.api",
     "Robot": "space_robot_model.robot",
     "Scenario": "space_robot.api",
-    "bench_many": "space_robot.api.together",
+    "bench_many": "space_robot.api.fly_many",
     "bias_force": "space_robot_model.robot.dynamics",
-    "fly_many": "space_robot.api.together",
+    "fly_many": "space_robot.api.fly_many",
     "forward_dynamics": "space_robot_model.robot.dynamics",
     "load_bag": "space_robot.analysis.load_bag",
     "make": "space_robot.learning",

@@ -39,7 +39,7 @@ def pulses(flown: FlownFlight) -> float:
 
 def propellant(flown: FlownFlight) -> float:
     """Return the propellant burnt, kg."""
-    return float(sum(a["propellant_kg"] for a in flown.report()["sizing"]["axes"].values()))
+    return flown.metrics["sizing.thrusters.propellant"]
 
 
 def largest_attitude_error(flown: FlownFlight) -> float:

@@ -1,21 +1,20 @@
 """The robot, its hardware and its environment, as they were flown.
 
-A flight in this process has its resolved scenario. A bag carries the numbers. One that does not (an
-older one, or of another recorder) is taken at its names' word: the robot, case and gains of that
-name here and now. Files and modules that it names are opened only if it is trusted
-(`FlightLog.trusted`).
+A flight in this process has its resolved scenario, a bag the numbers. A description without them,
+as of another recorder, is taken at its names' word: the robot and case of that name here and now.
+Files and modules that it names are opened only if the log is trusted (`FlightLog.trusted`).
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from space_robot_control.controller.settings import ControllerNodeSettings
-from space_robot_control.laws.names import is_plain, require_shipped_file
+from space_robot_control.laws.names import require_shipped_file
 from space_robot_model.hardware.base_actuators import BaseActuatorSettings
 from space_robot_model.robot import Robot
 from space_robot_model.robot.find import find_robot
@@ -130,7 +129,7 @@ def torque_limits(log: FlightLog) -> TorqueLimits:
     Raises:
         InputError: not even the case is named, or it is not here.
     """
-    settings = _plant_settings(log, ("base_torque_limit", "joint_torque_limit"))
+    settings = _plant_settings(log)
     base, joint = settings.base_torque_limit, settings.joint_torque_limit
     if base_actuators_of(log).base_actuation != IDEAL:
         base = 0.0  # hardware has limits of its own
@@ -152,7 +151,7 @@ def orbit_of(log: FlightLog) -> OrbitSettings:
     Raises:
         InputError: not even the case is named, or it is not here.
     """
-    return _plant_settings(log, [name for name, _ in leaves(OrbitSettings)])
+    return _plant_settings(log)
 
 
 def captures_of(log: FlightLog) -> Captures:
@@ -216,11 +215,7 @@ def event_times(log: FlightLog) -> Array:
     return times
 
 
-def _plant_settings(log: FlightLog, keys: Sequence[str] = ()) -> PlantNodeSettings:
-    """Return the plant's settings; if all ``keys`` are given, nothing but these is looked at.
-
-    The bag has every number. An older one has those that were set, and names of files.
-    """
+def _plant_settings(log: FlightLog) -> PlantNodeSettings:
     if log.scenario is not None:
         settings: PlantNodeSettings = log.scenario.plant
         return settings
@@ -228,34 +223,15 @@ def _plant_settings(log: FlightLog, keys: Sequence[str] = ()) -> PlantNodeSettin
     if parameters.keys() >= _NUMBERS:
         return validate(PlantNodeSettings, nest(parameters), "plant parameters of the bag")
     if not parameters:
-        parameters = {
-            key: log.flight[key]
-            for key in ("robot", "case", "mission", "orbit")
-            if key in log.flight
-        }
+        names = ("robot", "case", "mission", "orbit")
+        parameters = {key: log.flight[key] for key in names if key in log.flight}
     if not parameters:
         raise NotDescribedError("the bag does not say what the plant was told")
-    if keys and all(key in parameters for key in keys):
-        parameters = {key: parameters[key] for key in keys}
-    parameters = _without_told_robot(log, parameters)
     check_files(log, parameters)
-    # their numbers are in the bag, while their files may be elsewhere
-    has_orbit = "orbital_elements.height" in parameters
-    in_bag = ("actuators", "sensors", *(("orbit",) if has_orbit else ()))
-    return PlantNodeSettings.resolve({k: v for k, v in parameters.items() if k not in in_bag})
-
-
-def _without_told_robot(log: FlightLog, parameters: Mapping[str, Any]) -> dict[str, Any]:
-    """Leave out the files of a robot and a mission all of which the bag tells."""
-    files = {
-        "robot": isinstance(log.flight.get("robot_file"), dict),
-        "mission": "joints_deg" in parameters_of(log, "mission"),
-    }
-    return {
-        key: value
-        for key, value in parameters.items()
-        if not files.get(key) or is_plain(str(value))
-    }
+    # the columns of the bag and `base_actuators` have these, while their files may be elsewhere
+    for in_bag in ("actuators", "sensors"):
+        parameters.pop(in_bag, None)
+    return PlantNodeSettings.resolve(parameters)
 
 
 def sensors_of(log: FlightLog) -> str:

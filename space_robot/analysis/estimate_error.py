@@ -23,7 +23,7 @@ from space_robot_msgs_py.errors import InputError
 
 from .analysed_log import AnalysedLog
 from .described import DIRECT, navigation_of, parameters_of
-from .generalised_motion import applied_force, continuous_error, mean_acceleration, measured_rows
+from .errors import applied_force, continuous_error, mean_acceleration, measured_rows
 from .series import Definition, TimeSeries, series
 
 Array = NDArray[np.float64]

@@ -17,8 +17,7 @@ from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.config.validation import one_of
 from space_robot_msgs_py.errors import InputError
 
-from .analysed_log import AnalysedLog
-from .pointing_budget import PointingBudget
+from .analysed_log import AnalysedLog, PointingBudget
 from .series import GROUPS, Definition, MetricGroup, SeriesGroup, pattern
 
 MODULES = (
@@ -30,6 +29,7 @@ MODULES = (
     "tool_path",
     "momentum",
     "external_torques",
+    "sizing",
 )
 """Modules with metrics, in the order of reports."""
 for _module in MODULES:

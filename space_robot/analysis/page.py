@@ -6,10 +6,10 @@ import json
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+import jinja2
+
 from ..console.tables import Column, JudgedCell, Table
-from .report_tables import comparison_table
-from .sizing_table import sizing_table
-from .template import template
+from .report_tables import comparison_table, sizing_table
 from .words import Report, law_of, notes, remarks
 
 
@@ -58,3 +58,26 @@ def _whole(report: Report) -> bool:
     """Return whether the bag holds the flight without loss, gap or damage."""
     missing = any(report["lost"].values()) or report["filled_ticks"]
     return not (missing or report["unfinished"] or report["damage"])
+
+
+def template(package: str, name: str) -> jinja2.Template:
+    """Load the template ``name`` from the folder ``templates`` of ``package``; it escapes.
+
+    It may import ``table.html.j2``, which draws a `tables.Table`. Data for a script are written
+    with the filter ``tojson``, which escapes what would end or hide the script.
+    """
+    environment = jinja2.Environment(
+        loader=jinja2.ChoiceLoader(
+            [
+                jinja2.PackageLoader(package, "templates"),
+                jinja2.PackageLoader("space_robot.analysis", "templates"),
+            ]
+        ),
+        autoescape=True,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        undefined=jinja2.StrictUndefined,
+    )
+    environment.filters["zip"] = zip
+    environment.policies["json.dumps_kwargs"] = {"separators": (",", ":"), "allow_nan": False}
+    return environment.get_template(name)

@@ -18,7 +18,7 @@ from space_robot_model.elementary.matrices import dot_rows, norms, unit_rows
 from space_robot_model.robot.placements import tool_pose
 from space_robot_msgs_py.bag.flight_log import BLOCK_TICKS
 
-from .analysed_log import ANGLES, AnalysedLog
+from .analysed_log import ANGLES, AnalysedLog, window_ticks
 from .errors import (
     attitude_drift,
     joined_error,
@@ -26,7 +26,6 @@ from .errors import (
     relative_attitude,
     rotation_vectors,
 )
-from .pointing_budget import window_ticks
 from .series import Definition, TimeSeries, metrics, series
 
 Array = NDArray[np.float64]

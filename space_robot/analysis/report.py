@@ -9,12 +9,11 @@ from space_robot_msgs_py.bag.law_history import as_data, laws_of
 from space_robot_msgs_py.config.validation import short
 from space_robot_msgs_py.errors import InputError
 
-from .analysed_log import AnalysedLog
+from .analysed_log import AnalysedLog, PointingBudget, pointed_axis, pointing_of
 from .described import actuators_of, event_labels, navigation_of, sensors_of, start_step_of
 from .errors import UNAVAILABLE
 from .measure import evaluate
-from .pointing_budget import PointingBudget, pointed_axis, pointing_of
-from .sizing import ActuatorSet, sizing
+from .sizing import ActuatorSet, requirements
 
 DESCRIBED = ("controller", "case", "gains", "robot")
 """Keys of a flight's description that a report repeats."""
@@ -38,19 +37,15 @@ def analyze(
     """
     if not isinstance(log, FlightLog):
         raise InputError(f"log: a FlightLog was expected (load_bag reads one), got {short(log)}")
-    flight = AnalysedLog(_without_gaps(log), budget)
+    flight = AnalysedLog(_without_gaps(log), budget, actuators.settings if actuators else None)
     numbers, unavailable = evaluate(flight)
-    try:
-        loads = sizing(flight, actuators)
-    except InputError as error:
-        loads, unavailable["sizing"] = None, str(error)
     if not flight.controls_base:
         unavailable = UNAVAILABLE | unavailable
     return {
         **_flown(flight, log.ticks),
         "pointing": _pointing(flight),
         "metrics": numbers,
-        "sizing": loads,
+        "sizing": None if "sizing" in unavailable else _sizing(flight, actuators, numbers),
         "unavailable": unavailable,
         **recording(flight.log),
     }
@@ -87,6 +82,15 @@ def _pointing(flight: AnalysedLog) -> dict[str, Any] | None:
         return None
     points = pointed_axis(*pointing_of(flight.log)) is not None
     return {"points": points, **flight.budget.model_dump()}
+
+
+def _sizing(
+    flight: AnalysedLog, other: ActuatorSet | None, numbers: dict[str, float]
+) -> dict[str, Any]:
+    """Judge whether the parts of actuators have what is asked of them; without parts: nothing."""
+    name, settings = other or ActuatorSet(actuators_of(flight.log), flight.actuators)
+    judged = [requirement.as_data() for requirement in requirements(settings, numbers)]
+    return {"actuators": name, "flown": other is None, "requirements": judged}
 
 
 def recording(log: FlightLog) -> dict[str, Any]:

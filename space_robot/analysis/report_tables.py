@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import groupby
 from typing import Any
 
 import numpy as np
 
-from ..console.tables import NONE, Column, Group, Table
+from space_robot_msgs_py.topics import BASE_AXES
+
+from ..console.tables import NONE, Column, Group, JudgedCell, Row, Table
 from .described import IDEAL
 from .measure import column_unit, describe, group_of
 from .series import GROUPS
@@ -101,7 +103,9 @@ def comparison_table(reports: Mapping[str, Report]) -> Table:
         flights.append(["share analyzed", *(f"{r['ticks'] / r['flight_ticks']:.1%}" for r in each)])
     columns = Column(is_label=True), *(Column(name) for name in reports)
     groups = _groups(each, shown_names(each))
-    return Table("", columns, [Group(flights, "flight"), *groups, *_asked(each), *_recording(each)])
+    return Table(
+        "", columns, [Group(flights, "flight"), *groups, *_demand_on_axes(each), *_recording(each)]
+    )
 
 
 def shown_names(reports: Sequence[Report]) -> list[str]:
@@ -147,17 +151,14 @@ def _is_of_table_v(name: str, report: Report) -> bool:
     return name.rpartition(".")[0] in table_v_columns(report["metrics"])
 
 
-def _asked(reports: Sequence[Report]) -> list[Group]:
-    """Return what was asked of each axis of the base."""
+def _demand_on_axes(reports: Sequence[Report]) -> list[Group]:
     rows = []
-    axes = dict.fromkeys(axis for r in reports if r["sizing"] for axis in r["sizing"]["axes"])
-    for key, name in (
-        ("peak_torque_n_m", "torque (N m)"),
-        ("peak_momentum_n_m_s", "momentum (N m s)"),
-    ):
-        for axis in axes:
-            each = [r["sizing"]["axes"][axis][key] if r["sizing"] else None for r in reports]
-            rows.append([f"{axis} {name}", *(NONE if v is None else f"{v:.4g}" for v in each)])
+    for key, name in (("peak_torque", "torque (N m)"), ("peak_momentum", "momentum (N m s)")):
+        for axis in BASE_AXES:
+            each = [report["metrics"].get(f"sizing.{axis}.{key}") for report in reports]
+            if any(value is not None for value in each):
+                values = (NONE if value is None else f"{value:.4g}" for value in each)
+                rows.append([f"{axis} {name}", *values])
     note = "largest torque commanded, and momentum that wheels have to hold for it"
     return [Group(rows, "asked of the base", note)] if rows else []
 
@@ -176,3 +177,87 @@ def _errors_of(report: Report) -> str:
     if report["truth_recorded"]:
         return "the truth"
     return "the truth" if report["sensors"] == IDEAL else "what was measured"
+
+
+BY_AXIS = (
+    ("peak torque", "N m", "peak_torque"),
+    ("RMS torque", "N m", "rms_torque"),
+    ("angular impulse", "N m s", "angular_impulse"),
+    ("stored momentum", "N m s", "peak_momentum"),
+    ("pulses", "-", "pulses"),
+    ("propellant", "kg", "propellant"),
+)
+"""Definition, unit and key of what is asked of each axis."""
+
+MANY_TIMES = 10.0
+"""Lack, as a share of what a part has, from which on the table has a multiple, not a margin."""
+
+
+def sizing_table(report: Report) -> Table | None:
+    """Tabulate the sizing of a flight; None where it has none."""
+    sizing = report["sizing"]
+    if sizing is None:
+        return None
+    requirements = sizing["requirements"]
+    parts = groupby(requirements, key=lambda requirement: requirement["part"])
+    judged = {(r["part"], r["quantity"]): r for r in requirements}
+    groups = [Group(list(_axis_rows(axis, report["metrics"], judged)), axis) for axis in BASE_AXES]
+    groups += [
+        Group([_row(r["quantity"], r["unit"], r["asked"], r) for r in each], part)
+        for part, each in parts
+        if part not in BASE_AXES
+    ]
+    columns = (
+        Column(is_label=True),
+        Column("unit", is_label=True),
+        Column("asked", spec=".4g"),
+        *((Column("has"), Column("margin")) if requirements else ()),
+    )
+    rows = [Group([row[: len(columns)] for row in g.rows], g.name) for g in groups]
+    return Table(_title(sizing), columns, rows, _notes(report))
+
+
+def _axis_rows(
+    axis: str, metrics: Mapping[str, float], judged: Mapping[tuple[str, str], Any]
+) -> Iterator[Row]:
+    for quantity, unit, key in BY_AXIS:
+        if (asked := metrics.get(f"sizing.{axis}.{key}")) is not None:
+            yield _row(quantity, unit, asked, judged.get((axis, quantity)))
+
+
+def _row(quantity: str, unit: str, asked: float, judged: dict[str, Any] | None) -> Row:
+    if judged is None:
+        return quantity, unit, asked, "", ""
+    has = "no limit" if judged["has"] is None else f"{judged['has']:.4g}"
+    if judged["is_at_limit"]:
+        return quantity, unit, asked, has, JudgedCell("", "at the limit", "bad")
+    margin = judged["margin"]
+    if margin is not None and margin <= -MANY_TIMES:
+        return quantity, unit, asked, has, JudgedCell("", f"{1.0 - margin:.3g} times", "bad")
+    text = "" if margin is None else f"{100.0 * margin:+.0f} %"
+    verdict = ("has it", "good") if judged["is_met"] else ("lacks it", "bad")
+    return quantity, unit, asked, has, JudgedCell(text, *verdict)
+
+
+def _title(sizing: dict[str, Any]) -> str:
+    if not sizing["requirements"]:
+        return "what the flight asks of its base"
+    who = "had" if sizing["flown"] else "would have"
+    return f"what the flight asks of its base, and what actuators {sizing['actuators']} {who}"
+
+
+def _notes(report: Report) -> list[str]:
+    sizing, notes = report["sizing"], []
+    if report["metrics"].get("wheels.saturation"):
+        notes.append(
+            "wheels were at their limits: what the law then asked for is not what the mission "
+            "asks; fly ideal actuators for that"
+        )
+    if not sizing["requirements"] or sizing["flown"]:
+        return notes
+    parts = {requirement["part"] for requirement in sizing["requirements"]}
+    if "thrusters" in parts:
+        notes.append("propellant: the least, were thrusters not on or off; pulses: fly them")
+    if "wheel_1" in parts:
+        notes.append("wheels share what is asked by the pseudo-inverse of their axes")
+    return notes

@@ -11,6 +11,7 @@ in the spectrum, so that limit cycle, noise and switching are distinguished by t
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -26,7 +27,6 @@ from .analysed_log import AnalysedLog
 from .errors import AxisIndex, controls_base
 from .pointing import TABLE_V
 from .series import Definition, TimeSeries, metrics, series
-from .spectrum import hann, segment_spectra
 
 Array = NDArray[np.float64]
 
@@ -249,3 +249,45 @@ def desired_torque(log: FlightLog, robot: Robot) -> Array:
     return (inverse_dynamics if controls_base(log) else free_inverse_dynamics)(
         robot.nominal, references
     )
+
+
+def segment_spectra(
+    values: Callable[[int, int], Array],
+    ticks: int,
+    window: Array,
+    step: int,
+    is_detrended: bool = False,
+) -> Iterator[Array]:
+    """Yield the one-sided power spectrum (F, axes) of each whole segment of a signal.
+
+    The power at a frequency is the squared size of the transform, that of the negative frequency
+    added.
+
+    Args:
+        values: returns the rows (stop - start, axes) from ``start`` to before ``stop``.
+        ticks: rows of the signal.
+        window: (L,) weights of a segment's rows.
+        step: rows from the first of a segment to the first of the next.
+        is_detrended: whether each segment's linear trend goes first.
+    """
+    length = len(window)
+    time = np.arange(length) - 0.5 * (length - 1)
+    starts = range(0, ticks - length + 1, step)
+    together = max(1, (BLOCK_TICKS - length) // step + 1)
+    for first in range(0, len(starts), together):
+        part = starts[first : first + together]
+        rows = values(part[0], part[-1] + length)
+        for start in part:
+            segment = rows[start - part[0] : start - part[0] + length]
+            if is_detrended:
+                slope = time @ segment / np.sum(time * time)
+                segment = segment - np.mean(segment, axis=0) - time[:, np.newaxis] * slope
+            power: Array = np.abs(np.fft.rfft(window[:, np.newaxis] * segment, axis=0)) ** 2
+            power[1 : (length + 1) // 2] *= 2.0  # but not at zero and at Nyquist's frequency
+            yield power
+
+
+def hann(rows: int, period: int) -> Array:
+    """Return ``rows`` numbers of Hann's window of a ``period`` in rows."""
+    window: Array = 0.5 - 0.5 * np.cos(2.0 * np.pi * np.arange(rows) / period)
+    return window

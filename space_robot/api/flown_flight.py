@@ -25,13 +25,20 @@ from ..flight.ending import COMPLETE, Ending
 from ..flight.flight_messages import record
 from ..flight.plan import Flight
 from .flight_page import HEIGHT_PX, FlightPage, draw_page, show_page
-from .report import flight_report
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from pandas import DataFrame
 
     from ..analysis.figures.figure_set import FigureSet
+from collections.abc import Callable
+
+from space_robot_msgs_py.errors import FlightError
+
+from ..console.progress import flight_progress
+from ..flight.compilation import compile_kernels
+from ..flight.ending import DIVERGED
+from ..flight.simulate import simulate
 
 
 class FlownFlight:
@@ -261,3 +268,96 @@ class FlownFlight:
         figures = FigureSet()
         figures.add("flight", self.log.longest_stretch())
         return figures
+
+
+FLOWN = (
+    "controller",
+    "case",
+    "gains",
+    "own_gains",
+    "robot",
+    "mission",
+    "sensors",
+    "period",
+    "swaps",
+    "faults",
+    "events",
+    "disturbance",
+)
+
+
+def flight_report(
+    flight: Flight, ending: Ending, metrics: dict[str, Any], bag: Path | None
+) -> dict[str, Any]:
+    """Return the ``metrics`` of a flight with ``outcome``, ``reason`` and ``ended_at_s``.
+
+    For a flight that ended early also its description, as far as it is not in ``metrics``,
+    ``planned_ticks``, ``bag`` (None if there is none), ``error`` and, if it ``diverged``, the tick
+    and time.
+    """
+    if ending.error is None:
+        return metrics | ending.as_record()
+    planned, diverged = flight.description, {"tick": ending.tick, "time_s": ending.ended_at_s}
+    return {
+        **{key: planned[key] for key in FLOWN if key in planned},
+        **metrics,
+        "planned_ticks": flight.ticks,
+        "bag": str(bag) if bag and bag.exists() else None,
+        "diverged": diverged if ending.outcome == DIVERGED else None,
+        "error": ending.reason,
+        **ending.as_record(),
+    }
+
+
+def fly_in_process(
+    flight: Flight,
+    bag: Path | None = None,
+    progress: Callable[[float], object] | None = None,
+    keep_log: bool = True,
+) -> FlownFlight:
+    """Fly a checked flight from the present state of its plant.
+
+    Args:
+        flight: to be flown.
+        bag: folder to record to; None: none.
+        progress: called regularly with the simulated time, s.
+        keep_log: False: only the metrics are kept.
+
+    Raises:
+        InputError: the bag cannot be created, or there is no room for a log.
+    """
+    flight.check_in_process()
+    if bag:
+        check_bag_path(bag)
+    compile_kernels(bool(flight.plant.names.actuators))
+
+    def show(tick: int) -> None:
+        if progress:
+            progress(tick * flight.period)
+
+    try:
+        log, ending = simulate(flight, bag, show), Ending.complete(flight.ticks, flight.period)
+    except FlightError as error:
+        if error.log is None:
+            raise
+        log, ending = error.log, Ending.early(error, flight.period)
+    return FlownFlight(flight, ending, bag, log, keep_log)
+
+
+def fly_with_progress(
+    flight: Flight,
+    bag: Path | None,
+    progress: Callable[[float], object] | bool | None,
+    keep_log: bool,
+) -> FlownFlight:
+    """Fly as `fly_in_process` does; ``progress`` True shows a progress line.
+
+    Raises:
+        InputError: see `fly_in_process`.
+    """
+    if progress is not True:
+        return fly_in_process(flight, bag, progress or None, keep_log)
+    _ = flight.supervisor  # compiled, or refused, before the line begins
+    compile_kernels(bool(flight.plant.names.actuators))  # has a progress line of its own
+    with flight_progress(flight.ticks * flight.period, flight.law.name) as show:
+        return fly_in_process(flight, bag, show, keep_log)

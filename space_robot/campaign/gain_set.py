@@ -16,20 +16,18 @@ from ..console.files import atomic_file, make_folder
 from ..flight.plan import Scenario
 from ..scenario.node_settings import FlightSettings
 from ..scenario.robots import Robots
-from ..tuning.demand import demand
 from ..tuning.flexible import fast_inertia
 from ..tuning.gain_file import gain_files
-from ..tuning.inertia import SAMPLING, inertia_along, sampled_reference
+from ..tuning.inertia import SAMPLING, inertia_along, postures_along, sampled_reference
 from ..tuning.method import Tuned, tune
 from ..tuning.noise import listen
-from ..tuning.postures import postures_along
-from ..tuning.task import TuningOptions
+from ..tuning.task import TuningOptions, force_demand
 
 
 def tuned_set(
     options: Mapping[str, Any],
     cases: Sequence[str],
-    wishes: TuningOptions,
+    targets: TuningOptions,
     step: Callable[[str], None],
 ) -> Tuned:
     """Tune a gain set.
@@ -37,7 +35,7 @@ def tuned_set(
     Args:
         options: of a `Scenario`: robot (the nominal one), mission, sensors, navigation.
         cases: names or paths of the environments.
-        wishes: the user's tuning options.
+        targets: of the user.
         step: called with a description of each step.
 
     Raises:
@@ -58,7 +56,7 @@ def tuned_set(
             places = motion.joints[:, 0]
             inertias.append(fast_inertia(loaded, places))
     step("forces along the mission")
-    asked = demand(nominal, reference, [own.plant for own in settings])
+    demand = force_demand(nominal, reference, [own.plant for own in settings])
     plant, navigation, noise = settings[0].plant, settings[0].controller.filter_settings, None
     if plant.sensors != "ideal" or navigation:
         step("noise of the sensors")
@@ -66,7 +64,7 @@ def tuned_set(
     postures = postures_along(nominal, reference, SAMPLING)
     step("gains")
     has_gears = any(nominal.gears)
-    return tune(np.concatenate(inertias), postures, asked, wishes, plant.period, noise, has_gears)
+    return tune(np.concatenate(inertias), postures, demand, targets, plant.period, noise, has_gears)
 
 
 def write_set(tuned: Tuned, command: str, folder: Path) -> list[Path]:

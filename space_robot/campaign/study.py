@@ -16,8 +16,8 @@ from space_robot_msgs_py.config.text import choices
 from space_robot_msgs_py.config.validation import StrictModel, read_yaml, short, validate
 from space_robot_msgs_py.errors import InputError, explained_by
 
+from ..analysis.analysed_log import PointingBudget
 from ..analysis.own_metric import check_names, text_of
-from ..analysis.pointing_budget import PointingBudget
 from ..scenario.disturbances import as_disturbance
 from ..scenario.options import OPTIONS
 from ..scenario.resolve import resolve

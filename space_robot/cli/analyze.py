@@ -112,8 +112,8 @@ def analyze(
     from space_robot_msgs_py.bag.reader import read_flight
 
     from ..analysis import analyze, excerpt
+    from ..analysis.analysed_log import PointingBudget
     from ..analysis.export import check_parquet, write_csv, write_parquet
-    from ..analysis.pointing_budget import PointingBudget
     from ..console.files import check_free, write_text
 
     if parquet:
@@ -211,8 +211,7 @@ def _print(reports: dict[str, dict[str, Any]], as_json: bool) -> None:
         reports_shown = list(reports.values())
         echo_json(reports_shown[0] if len(reports_shown) == 1 else reports_shown)
         return
-    from ..analysis.report_tables import metrics_table, rms_table
-    from ..analysis.sizing_table import sizing_table
+    from ..analysis.report_tables import metrics_table, rms_table, sizing_table
     from ..console.terminal_tables import print_table
     from .report_display import print_comparison
 

@@ -91,8 +91,8 @@ def export(
     from ..console.progress import counting_progress
     from ..console.terminal import echo_json
     from ..export.folder import check_folder, write_folder, write_readme
-    from ..export.recorded import recorded_flights
-    from ..export.software import export as export_software
+    from ..export.software import export as exported_of
+    from ..export.software import recorded_flights
     from ..export.verify import verify
     from ..flight.compilation import compile_kernels
     from ..scenario.scenario import Scenario

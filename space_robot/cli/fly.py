@@ -40,7 +40,7 @@ def fly(as_json: bool, bag: Path | None, **options: Any) -> None:
     from space_robot_msgs_py.errors import FlightError
 
     from ..analysis import analyze
-    from ..api.report import flight_report
+    from ..api.flown_flight import flight_report
     from ..console.terminal import echo_json
     from ..flight.bag_path import check_bag_path, default_bag
     from ..flight.ending import Ending

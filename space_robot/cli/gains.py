@@ -152,13 +152,13 @@ def tune(context: click.Context, /, output: Path, **options: Any) -> None:
     """
     from ..campaign.gain_set import tuned_set, write_set
     from ..console.terminal import terminal
+    from ..tuning.gain_file import estimate_remark
     from ..tuning.task import TuningOptions
-    from ..tuning.warning import estimate_remark
 
     names = ("margin", "mass_uncertainty", "bandwidth", "ripple", "h_bar", "noise_ripple")
-    wanted, cases = TuningOptions(*(options.pop(name) for name in names)), options.pop("cases")
+    targets, cases = (TuningOptions(*(options.pop(name) for name in names)), options.pop("cases"))
     with terminal(stderr=True).status("tuning") as status:
-        tuned = tuned_set(options, cases, wanted, status.update)
+        tuned = tuned_set(options, cases, targets, status.update)
     for path in write_set(tuned, _command(context), output):
         click.echo(f"wrote {path}", err=True)
     if remark := estimate_remark(tuned):

@@ -24,10 +24,14 @@ from ..flight.simulate import simulate
 from ..scenario.node_settings import FlightSettings
 from ..tuning.flexible import FlexibleMotions, check_flexible
 from ..tuning.gain_check import GainCheck, check_gains, estimated_with, pair_corner
-from ..tuning.inertia import SAMPLING, inertia_along, sampled_reference
-from ..tuning.mass_errors import COARSE, DRAWS, check_masses, drawn_inertias
-from ..tuning.postures import postures_along
+from ..tuning.inertia import SAMPLING
+from ..tuning.inertia import inertia_along
+from ..tuning.inertia import sampled_reference
 from ..tuning.spectrum import LEAST_MARGIN
+from ..tuning.inertia import postures_along
+from ..tuning.spectrum import COARSE
+from ..tuning.spectrum import check_masses
+from ..tuning.spectrum import drawn_inertias
 
 Array = NDArray[np.float64]
 

@@ -67,8 +67,13 @@ def plan(
     from space_robot_model.robot.description import unit_remarks
     from space_robot_msgs_py.errors import FlightError
 
-    from ..analysis.lighter_mission import lightened_mission, mission_text, stretched_mission
-    from ..analysis.mission_plan import plan_report, planned_segments
+    from ..analysis.mission_plan import (
+        lightened_mission,
+        mission_text,
+        plan_report,
+        planned_segments,
+        stretched_mission,
+    )
     from ..console.files import write_text
     from ..console.terminal import echo_json
     from ..flight.mission_demand import held_base_remark

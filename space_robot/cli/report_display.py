@@ -10,8 +10,7 @@ from typing import Any
 import click
 from rich.console import Console
 
-from ..analysis.report_tables import comparison_table, rms_table
-from ..analysis.sizing_table import sizing_table
+from ..analysis.report_tables import comparison_table, rms_table, sizing_table
 from ..analysis.words import notes, remarks
 from ..console.terminal import echo_json, say, terminal
 from ..console.terminal_tables import print_table

@@ -27,7 +27,7 @@ def simulate(as_json: bool, bag: Path | None, **options: Any) -> None:
       space-robot simulate --fault torque_scale@2:base=0.99 --fault noise_gyro@0:1e-6
       space-robot simulate --event capture@10:small_satellite --event release@25:0.05
     """
-    from ..api.in_process import fly_in_process
+    from ..api.flown_flight import fly_in_process
     from ..console.progress import flight_progress
     from ..flight.bag_path import check_bag_path
     from ..flight.compilation import compile_kernels

@@ -10,7 +10,7 @@ from space_robot_control.flight_code.instances import write_sources
 from space_robot_msgs_py.errors import InputError
 
 from ..console.files import atomic_folder
-from .recorded import RecordedFlight
+from .software import RecordedFlight
 from .verify import ReplayVerdict
 
 BUILD_FILES = ("Makefile", "CMakeLists.txt", "misra_deviations.txt", "MISRA.md")

@@ -22,7 +22,7 @@ def make(task: str, **settings: Any) -> ReachEnv:
 
     Args:
         task: "reach": see `space_robot.learning.reach_env.ReachEnv`.
-        settings: of the task, see `space_robot.learning.episodes.ReachTask`.
+        settings: of the task, see `space_robot.learning.reach_env.ReachTask`.
 
     Raises:
         InputError: there is no such task, or a setting is out of its range.

@@ -15,7 +15,12 @@ from space_robot_msgs_py.config.text import html_table
 from space_robot_msgs_py.config.validation import StrictModel, one_line, one_of, short
 from space_robot_msgs_py.errors import InputError, explained_by
 
-from .options import OPTIONS, Options
+from .options import OPTIONS
+from .options import Options
+from ..console.progress import check_progress
+from ..flight.compilation import compile_kernels
+from ..flight.plan import Flight
+from ..flight.plan import resolve
 
 if TYPE_CHECKING:
     from space_robot_sim.faults.grammar import Kinds

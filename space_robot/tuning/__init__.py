@@ -1,4 +1,12 @@
-"""Gain tuning: stability margin and noise of gain sets for a robot and a mission, without flights.
+"""Gain tuning: stability, margin and noise of gain sets for a robot and a mission, without flights.
 
-`gain_check` checks existing gains, `method` computes a new set.
+| module | |
+|---|---|
+| `inertia` | the inertia H_S along a mission, and the postures of the nominal robot |
+| `linear_law`, `closed_loop` | the linear part of a law, from its code; its loop on a rigid robot |
+| `flexible` | the same loop with the springs of gears |
+| `spectrum` | convergence of a time-delay estimate, also with wrong masses |
+| `gain_check`, `warning` | the check of given gains; remarks before a flight |
+| `noise`, `ripple` | noise and lag of the sensors; ripple of the torque by them |
+| `method` | a new set: `task`, `estimate_design`, `law_gains`; its texts: `gain_file` |
 """

@@ -15,13 +15,14 @@ pair takes, is an input.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from .inertia import Posture
 from .linear_law import LinearLaw
-from .postures import Posture
 
 Array = NDArray[np.float64]
 
@@ -31,8 +32,6 @@ MOST_SCALE = 1.0
 """Largest margin in torque scale that is searched: a torque reported twice as large."""
 MOST_ACTUAL = 100.0
 """Largest ratio of actual to commanded torque that is searched."""
-HALVINGS = 14
-"""Of a searched interval, see `largest_stable`."""
 
 
 class SmallMotion(NamedTuple):
@@ -127,6 +126,14 @@ def growth(matrix: Array) -> float:
     return float(np.abs(np.linalg.eigvals(matrix)).max())
 
 
+def bisect(low: float, high: float, holds: Callable[[float], bool], halvings: int = 14) -> float:
+    """Return the largest number up to which something holds, between ``low`` and ``high``."""
+    for _ in range(halvings):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if holds(middle) else (low, middle)
+    return low
+
+
 class RigidLoop:
     """A law on a rigid robot in some postures."""
 
@@ -178,11 +185,7 @@ class RigidLoop:
                 continue
             if not is_stable(index, 0.0):
                 return 1.0 - self.radius()
-            low, high = 0.0, limit
-            for _ in range(HALVINGS):
-                middle = 0.5 * (low + high)
-                low, high = (middle, high) if is_stable(index, middle) else (low, middle)
-            limit = low
+            limit = bisect(0.0, limit, partial(is_stable, index))
         return limit
 
     def _is_stable(self, index: int, reported: float, actual: float) -> bool:

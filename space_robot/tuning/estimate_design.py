@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from space_robot_msgs_py.errors import InputError
 
-from .noise_limits import quiet_bandwidth, quiet_weight
+from .ripple import quiet_bandwidth, quiet_weight
 from .spectrum import eigenvalues
 from .task import CONSTANT, MOST_PER_TICK, NOMINAL, SEPARATION, TuningTask
 
@@ -29,18 +29,18 @@ class EstimateDesign:
     """`CONSTANT` or `NOMINAL`."""
     h_bar: Array
     """(m,) kg m2; zero for the nominal inertia."""
-    weight: float
-    """w of the pair's low-pass; 1: none."""
-    delay: float
-    """T of step 4, s."""
-    bandwidth: float
-    """W of its laws, rad/s."""
-    fastest: float
-    """The largest one, a quarter of the estimate's pole, rad/s."""
     smallest: float
     """Smallest eigenvalue of ``H_S^-1 H^`` with nominal masses and every payload."""
     largest: float
     """Largest eigenvalue of the same."""
+    weight: float
+    """w of the pair's low-pass; 1: none."""
+    delay: float
+    """T of step 4, s."""
+    fastest: float
+    """The largest W, a quarter of the estimate's pole, rad/s."""
+    bandwidth: float
+    """W of its laws, rad/s."""
     gap: Array
     """(m,) error of the estimate in a tick, N m."""
     error: Array
@@ -55,17 +55,14 @@ def constant_estimate(task: TuningTask) -> EstimateDesign:
     Raises:
         InputError: the sensors are too noisy.
     """
-    wishes, eigen = task.wishes, eigenvalues(task.inertia, task.shape)
+    options, eigen = task.options, eigenvalues(task.inertia, task.shape)
     low, high = float(eigen.min()), float(eigen.max())
-    size = wishes.margin * (1.0 + wishes.mass_uncertainty) / low
-    weight = min(1.0, (1.0 - wishes.mass_uncertainty) / (size * high))
+    size = options.margin * (1.0 + options.mass_uncertainty) / low
+    weight = min(1.0, (1.0 - options.mass_uncertainty) / (size * high))
     h_bar = size * task.shape
-    if task.noise and not wishes.noise_ripple:
+    if task.noise and not options.noise_ripple:
         weight = quiet_weight(weight, task.noise.acceleration, task.allowed / h_bar)
-    first = EstimateDesign(
-        CONSTANT, h_bar, weight, 0.0, 0.0, 0.0, size * low, size * high, h_bar, h_bar
-    )
-    return with_weight(task, first, weight)
+    return _design(task, CONSTANT, h_bar, size * low, size * high, weight)
 
 
 def nominal_estimate(task: TuningTask, weight: float | None = None) -> EstimateDesign:
@@ -81,14 +78,61 @@ def nominal_estimate(task: TuningTask, weight: float | None = None) -> EstimateD
     eigen = eigenvalues(task.inertia, task.nominal)
     low, high = float(eigen.min()), float(eigen.max())
     if weight is None:
-        weight = min(1.0, (1.0 - task.wishes.mass_uncertainty) / high)
-        if (noise := task.noise) and not task.wishes.noise_ripple:
+        weight = min(1.0, (1.0 - task.options.mass_uncertainty) / high)
+        if (noise := task.noise) and not task.options.noise_ripple:
             weight = quiet_weight(
                 weight, lambda w: noise.nominal_force(w, task.nominal), task.allowed
             )
-    none = np.zeros_like(task.shape)
-    first = EstimateDesign(NOMINAL, none, weight, 0.0, 0.0, 0.0, low, high, none, none)
-    return with_weight(task, first, weight)
+    return _design(task, NOMINAL, np.zeros_like(task.shape), low, high, weight)
+
+
+def with_weight(task: TuningTask, design: EstimateDesign, weight: float) -> EstimateDesign:
+    """Return the estimate with another low-pass."""
+    return _design(task, design.kind, design.h_bar, design.smallest, design.largest, weight)
+
+
+def _design(
+    task: TuningTask, kind: str, h_bar: Array, smallest: float, largest: float, weight: float
+) -> EstimateDesign:
+    """Take steps 4 and 5; the pair of the nominal inertia has no lag but its own."""
+    options, is_constant = task.options, kind == CONSTANT
+    delay = task.period / weight + (task.lag if is_constant else 0.0)
+    slowest = options.margin if is_constant else smallest / (1.0 + options.mass_uncertainty)
+    fastest = slowest / delay / SEPARATION
+    bandwidth = options.bandwidth or fastest
+    if not is_constant and not options.bandwidth:
+        bandwidth = min(fastest, model_bandwidth(task))
+    gap = delay * task.demand.slope + 0.5 * options.margin * task.demand.peak
+    switching = 1.0
+    if is_constant:
+        error = gap / h_bar
+    else:
+        error = (np.abs(np.linalg.inv(task.inertia)) @ gap).max(axis=0)
+        switching = _switching_share(task, bandwidth * error)
+    return EstimateDesign(
+        kind,
+        h_bar,
+        smallest,
+        largest,
+        weight,
+        delay,
+        fastest,
+        bandwidth,
+        gap,
+        switching * error,
+        switching,
+    )
+
+
+def _switching_share(task: TuningTask, rough: Array) -> float:
+    """Return the share of ``W eps`` (m,) at which switching keeps to the allowed ripple, at most 1.
+
+    In discrete time the super-twisting term of an axis switches by about ``K_1^2 delta / 2``. With
+    the nominal inertia the force of each axis is H_S times that of all axes.
+    """
+    step = 0.5 * K_1_FACTOR**2 * task.period * rough
+    ripple = (np.abs(task.nominal) @ step).max(axis=0)
+    return float(np.min(task.allowed / ripple, initial=1.0))
 
 
 def check_estimate(task: TuningTask, design: EstimateDesign) -> None:
@@ -98,49 +142,17 @@ def check_estimate(task: TuningTask, design: EstimateDesign) -> None:
         InputError: the margin is beyond what the nominal inertia leaves, or the bandwidth beyond
             half of the estimate's pole.
     """
-    wishes, smallest = task.wishes, design.smallest / (1.0 + task.wishes.mass_uncertainty)
-    if design.kind == NOMINAL and smallest < wishes.margin:
+    options, smallest = task.options, design.smallest / (1.0 + task.options.mass_uncertainty)
+    if design.kind == NOMINAL and smallest < options.margin:
         raise InputError(
             f"margin must be at most {smallest:.3g} with the nominal inertia, this mass "
-            f"uncertainty and these payloads, got {wishes.margin:g}"
+            f"uncertainty and these payloads, got {options.margin:g}"
         )
     if design.bandwidth > 2.0 * design.fastest:
         raise InputError(
             f"bandwidth must be at most {2.0 * design.fastest:.3g} rad/s, half of the pole of an "
             f"estimate with this margin and lag, got {design.bandwidth:g}"
         )
-
-
-def with_weight(task: TuningTask, design: EstimateDesign, weight: float) -> EstimateDesign:
-    """Return the estimate with another low-pass: steps 4 and 5.
-
-    The pair of the nominal inertia has no lag but its own, see `method`.
-    """
-    wishes, asked, is_constant = task.wishes, task.asked, design.kind == CONSTANT
-    delay = task.period / weight + (task.lag if is_constant else 0.0)
-    slowest = wishes.margin
-    if not is_constant:
-        slowest = design.smallest / (1.0 + wishes.mass_uncertainty)
-    fastest = slowest / delay / SEPARATION
-    bandwidth = wishes.bandwidth or fastest
-    if not is_constant and not wishes.bandwidth:
-        bandwidth = min(fastest, model_bandwidth(task))
-    gap = delay * asked.slope + 0.5 * wishes.margin * asked.peak
-    if is_constant:
-        error, switching = gap / design.h_bar, 1.0
-    else:
-        error = _largest_acceleration(task.inertia, gap)
-        switching = _switching_share(task, bandwidth * error)
-    return replace(
-        design,
-        weight=weight,
-        delay=delay,
-        bandwidth=bandwidth,
-        fastest=fastest,
-        gap=gap,
-        error=switching * error,
-        switching=switching,
-    )
 
 
 def is_weak(design: EstimateDesign, task: TuningTask) -> bool:
@@ -158,30 +170,13 @@ def model_bandwidth(task: TuningTask, own: Array | None = None) -> float:
         task: with its lag and noise.
         own: (m,) inertia by which the law multiplies K_P and K_D; None: that of the model.
     """
-    if task.wishes.bandwidth:
-        return task.wishes.bandwidth
+    if task.options.bandwidth:
+        return task.options.bandwidth
     most = MOST_PER_TICK
     if own is None:
         own = np.diagonal(task.inertia, axis1=1, axis2=2).max(axis=0)
         most = task.most_per_tick
     bandwidth = most / task.period
-    if not task.wishes.noise_ripple:
+    if not task.options.noise_ripple:
         bandwidth = min(quiet_bandwidth(own, task.noise, task.allowed), bandwidth)
     return min(bandwidth, 1.0 / SEPARATION / task.lag) if task.lag else bandwidth
-
-
-def _switching_share(task: TuningTask, rough: Array) -> float:
-    """Return the share of ``W eps`` (m,) at which switching keeps to the allowed ripple, at most 1.
-
-    In discrete time the super-twisting term of an axis switches by about ``K_1^2 delta / 2``. With
-    the nominal inertia the force of each axis is H_S times that of all axes.
-    """
-    step = 0.5 * K_1_FACTOR**2 * task.period * rough
-    ripple = (np.abs(task.nominal) @ step).max(axis=0)
-    return float(np.min(task.allowed / ripple, initial=1.0))
-
-
-def _largest_acceleration(inertia: Array, force: Array) -> Array:
-    """Return the largest ``|H_S^-1| |F|`` (m,) of all configurations."""
-    largest: Array = (np.abs(np.linalg.inv(inertia)) @ force).max(axis=0)
-    return largest

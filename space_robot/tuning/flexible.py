@@ -10,6 +10,7 @@ terms decide; they do not count.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 
@@ -22,10 +23,9 @@ from space_robot_control.navigation.rate_filters import low_pass_weight
 from space_robot_model.robot import Robot
 from space_robot_model.robot.gears import FlexibleModel, flexible_model, geared_joints
 
-from .closed_loop import SLOWEST_GROWTH, SmallMotion, loop_of
-from .inertia import J0, inertia_in_rho
+from .closed_loop import SLOWEST_GROWTH, SmallMotion, bisect, loop_of
+from .inertia import J0, Posture, inertia_in_rho, postures_at
 from .linear_law import LinearLaw, linear_laws
-from .postures import Posture, postures_at
 
 Array = NDArray[np.float64]
 
@@ -35,8 +35,6 @@ LOWEST_HZ = 0.01
 """Lowest corner of a low-pass that is tried."""
 SCALES = (1e-3, 1e3)
 """Factors on the assumed inertia between which its limit is searched."""
-HALVINGS = 14
-"""Of the searched interval's logarithm: the limit is known to a thousandth."""
 
 
 @dataclass(frozen=True)
@@ -164,15 +162,12 @@ def check_flexible(law: ControlLaw, motions: FlexibleMotions, corner_hz: float) 
 
 
 def _largest(low: float, high: float, is_stable: Callable[[float], bool]) -> float:
-    """Return the largest value that is stable, by bisection; 0: none is."""
+    """Return the largest value that is stable, to a thousandth; 0: none is."""
     if not is_stable(low):
         return 0.0
     if is_stable(high):
         return high
-    for _ in range(HALVINGS):
-        middle = float(np.sqrt(low * high))
-        low, high = (middle, high) if is_stable(middle) else (low, middle)
-    return low
+    return math.exp(bisect(math.log(low), math.log(high), lambda x: is_stable(math.exp(x))))
 
 
 def _motion(

@@ -32,11 +32,9 @@ from space_robot_control.navigation.rate_filters import low_pass_weight
 
 from .closed_loop import SLOWEST_GROWTH, RigidLoop
 from .flexible import FlexibleCheck
-from .inertia import J0
+from .inertia import J0, Posture
 from .linear_law import depends_on_posture, force_by_rate, linear_laws
-from .mass_errors import MassCheck
-from .postures import Posture
-from .spectrum import LEAST_MARGIN, Spectrum, spectrum
+from .spectrum import LEAST_MARGIN, MassCheck, Spectrum, spectrum
 
 Array = NDArray[np.float64]
 
@@ -133,9 +131,6 @@ def check_gains(
             base without attitude actuators.
         postures: (K,) of the nominal robot; L is a multiple of K.
         acceleration_filter_hz: see `pair_corner`.
-
-    Raises:
-        LawError: the law's code failed.
     """
     weight = low_pass_weight(acceleration_filter_hz, law.period) or 1.0
     eigen = estimate_spectrum(law, inertia, postures, weight)
@@ -184,9 +179,6 @@ def check_loop(
 
     Args: see `check_gains`; ``weight`` is that of the pair's low-pass.
         has_margin: whether the margin in torque scale is wanted.
-
-    Raises:
-        LawError: the law's code failed.
     """
     every = _every(postures)
     some = postures[::every]
@@ -208,9 +200,6 @@ def noise_gain(law: ControlLaw, postures: Sequence[Posture], weight: float = 1.0
         law: with its gains and period.
         postures: of the nominal robot.
         weight: of the low-pass of the time-delay pair; 1: none.
-
-    Raises:
-        LawError: the law's code failed.
     """
     some = _extreme(postures) if depends_on_posture(law, postures) else postures[:1]
     gains = [np.abs(np.diag(force_by_rate(law, posture, weight))) for posture in some]

@@ -1,4 +1,4 @@
-"""Files of a tuned gain set, as in ``config/gains/<robot>/<set>``."""
+"""Texts of a tuned gain set: its files, as in ``config/gains/<robot>/<set>``, and a remark."""
 
 from __future__ import annotations
 
@@ -10,8 +10,10 @@ from numpy.typing import NDArray
 from space_robot_control.controller.gains import NOMINAL_H_BAR as IN_FILES
 from space_robot_control.controller.settings import OF_THE_SET
 
+from .estimate_design import MUCH_SLOWER
+from .law_gains import TunedLaw
 from .method import Tuned
-from .task import NOMINAL
+from .task import AUTO, NOMINAL
 
 Array = NDArray[np.float64]
 
@@ -40,8 +42,8 @@ def gain_files(tuned: Tuned, command: str) -> Mapping[str, str]:
     """
     head = [f"Made by `{command}`."]
     files = {
-        f"{law}.yaml": _file([*head, NOTES[law], *_numbers(tuned, law)], law, gains)
-        for law, gains in tuned.gains.items()
+        f"{name}.yaml": _file([*head, NOTES[name], *_numbers(tuned, law)], name, law.gains)
+        for name, law in tuned.laws.items()
     }
     files[OF_THE_SET] = "\n".join(
         [
@@ -55,26 +57,55 @@ def gain_files(tuned: Tuned, command: str) -> Mapping[str, str]:
     return files
 
 
-def _numbers(tuned: Tuned, law: str) -> Sequence[str]:
-    wishes, gains = tuned.wishes, tuned.gains[law]
-    lines = [
-        f"W = {tuned.bandwidths[law]:.3g} rad/s; masses wrong by {wishes.mass_uncertainty:.0%}."
-    ]
-    if "h_bar" in gains:
-        margin = wishes.margin
-        if tuned.h_bar == NOMINAL:
-            margin = tuned.smallest / (1.0 + wishes.mass_uncertainty)
+def estimate_remark(tuned: Tuned) -> str:
+    """Return a remark if a constant h_bar does not suit a set's robot; else empty.
+
+    Its laws with time-delay estimation are then weak, with less than a tenth of the bandwidth of
+    those with a model, or they have the nominal inertia.
+    """
+    design = tuned.design
+    if design.kind == NOMINAL:
+        if tuned.options.h_bar != AUTO:
+            return ""
+        return (
+            "The laws with time-delay estimation use the inertia of the nominal model (h_bar: "
+            "nominal), because no diagonal h_bar suits light and heavy directions of this robot at "
+            f"once: eigenvalues of H_S^-1 h_bar would be {tuned.constant.smallest:.2g} to "
+            f"{tuned.constant.largest:.3g}, with {tuned.constant.bandwidth:.2g} rad/s. dob and "
+            "adrc, whose inertia is a diagonal, too, are weak: "
+            f"{tuned.laws['dob'].bandwidth:.2g} and {tuned.laws['adrc'].bandwidth:.2g} rad/s."
+        )
+    if design.bandwidth >= MUCH_SLOWER * tuned.model_bandwidth:
+        return ""
+    return (
+        f"The laws with time-delay estimation are weak: {design.bandwidth:.2g} rad/s, those with a "
+        f"model {tuned.model_bandwidth:.2g}. Eigenvalues of H_S^-1 h_bar are {design.smallest:.2g} "
+        f"to {design.largest:.3g} (no diagonal h_bar suits light and heavy directions at once), so "
+        f"the estimate needs a low-pass and lags by {design.delay * 1e3:.3g} ms. What helps: the "
+        "inertia of the nominal model (gains tune --h-bar nominal); ctc or ctc_smc; panels on "
+        "hinges without motors as passive joints; a smaller margin or mass uncertainty (--margin, "
+        "--mass-uncertainty), where drives and masses are known that well; a shorter period."
+    )
+
+
+def _numbers(tuned: Tuned, law: TunedLaw) -> Sequence[str]:
+    options, design = tuned.options, tuned.design
+    lines = [f"W = {law.bandwidth:.3g} rad/s; masses wrong by {options.mass_uncertainty:.0%}."]
+    if "h_bar" in law.gains:
+        margin = options.margin
+        if design.kind == NOMINAL:
+            margin = design.smallest / (1.0 + options.mass_uncertainty)
         lines += [
-            f"Eigenvalues of H_S^-1 h_bar {tuned.smallest:.3g} to {tuned.largest:.3g}: "
+            f"Eigenvalues of H_S^-1 h_bar {design.smallest:.3g} to {design.largest:.3g}: "
             f"margin {margin:.1%}.",
-            f"The estimate lags by {tuned.delay * 1e3:.3g} ms; eps = {_list(tuned.error, 2)}.",
+            f"The estimate lags by {design.delay * 1e3:.3g} ms; eps = {_list(design.error, 2)}.",
         ]
-        if tuned.switching < 1.0:
+        if design.switching < 1.0:
             lines.append(
-                f"eps is {tuned.switching:.2g} times the bound of the estimate's error: K_1 for "
-                f"the whole would switch the force by more than {wishes.allowed_ripple:.0%}."
+                f"eps is {design.switching:.2g} times the bound of the estimate's error: K_1 for "
+                f"the whole would switch the force by more than {options.allowed_ripple:.0%}."
             )
-    return [*lines, *tuned.remarks[law]]
+    return [*lines, *law.remarks]
 
 
 def _file(comments: Sequence[str], law: str, gains: Mapping[str, Array]) -> str:

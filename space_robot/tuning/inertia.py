@@ -19,6 +19,9 @@ needs no compiled code, whose loading takes time.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -44,9 +47,6 @@ def sampled_reference(
     """Return the reference of a mission every ``step`` s, including the last waypoint.
 
     Of a long mission every part is sampled as often as the others.
-
-    Raises:
-        InputError: the waypoints do not fit the times or the joints.
     """
     mission = Mission(robot, settings, step)
     if (count := int(np.ceil(mission.duration / step - 1e-9)) + 1) <= MOST_SAMPLES:
@@ -73,9 +73,6 @@ def inertia_along(
         settings: of the mission; its last waypoint is included.
         step: between configurations, s.
         controls_base: whether the base has attitude actuators.
-
-    Raises:
-        InputError: the waypoints do not fit the times or the joints.
     """
     chunk = sampled_reference(robot, settings, step)
     inertia = semi_floating_inertia(robot.nominal, chunk.joints[:, 0])
@@ -148,3 +145,37 @@ def semi_floating_inertia(robot: Robot, joint_positions: Array) -> Array:
     moving = linear.swapaxes(2, 3) @ (robot.mass[:, np.newaxis, np.newaxis, np.newaxis] * linear)
     total: Array = (turning + moving).sum(axis=0)
     return total
+
+
+class Posture(NamedTuple):
+    """A configuration of the robot as the controller knows it, the base as desired."""
+
+    robot: Robot
+    """Without payload, passive joints and gears."""
+    joints: Array
+    """(n,) rad or m."""
+    inertia: Array
+    """(m, m) H_S; (n, n) H_f of the joints for a base without attitude actuators."""
+
+    @property
+    def axes(self) -> int:
+        """The number of axes that are controlled, the last ones of a law."""
+        return len(self.inertia)
+
+
+def postures_at(
+    robot: Robot, joint_positions: Iterable[Array], controls_base: bool = True
+) -> list[Posture]:
+    """Return the postures of the nominal ``robot`` for ``joint_positions`` (K, n), rad or m."""
+    nominal, positions = robot.nominal, np.asarray(joint_positions)
+    inertia = semi_floating_inertia(nominal, positions)
+    inertia = inertia_in_rho(inertia) if controls_base else free_inertia(inertia)
+    return [Posture(nominal, *pair) for pair in zip(positions, inertia, strict=True)]
+
+
+def postures_along(
+    robot: Robot, settings: MissionSettings, step: float, controls_base: bool = True
+) -> list[Posture]:
+    """Return the postures of the nominal ``robot`` every ``step`` s of a mission."""
+    chunk = sampled_reference(robot, settings, step)
+    return postures_at(robot, chunk.joints[:, 0], controls_base)

@@ -34,12 +34,12 @@
    - PD, with and without feedforward: ``K_D = 2 W d``, ``K_P = W^2 d``, the noise is multiplied by
      d in place of H_S.
    - Slotine and Li (1987): ``lambda = W``, ``K_D = W d``; gamma adapts with a bandwidth of W / 6
-     at the largest force of the mission (`laws_with_model`); spread is mu.
+     at the largest force of the mission (`law_gains`); spread is mu.
    - Disturbance observer: J is h_bar, g has the weight of the pair's low-pass, so that it equals
      the time-delay estimate (`spectrum`).
    - Active disturbance rejection: J is h_bar, but with ``max(lambda) / (1 - mu) <= 5``; omega_o has
      the lag of the pair's low-pass, ``3 / omega_o``, or less noise; ``omega_c = W``, at most
-     ``omega_o / 4``, and slower where the loop is not stable (`laws_with_observer`).
+     ``omega_o / 4``, and slower where the loop is not stable (`law_gains`).
    - INDI: the estimate with the nominal inertia and the low-pass of the set; its W by step 4 with
      ``min(lambda) / (1 + mu)`` in place of the margin, at most that of the laws with a model.
 
@@ -56,12 +56,27 @@ by which the super-twisting term switches in discrete time, remains within the a
 the force, ``|H_S| K_1^2 delta / 2``: K_1 of one axis moves all axes here. It is used on
 request, or (``auto``) where the laws with a constant h_bar would have less than a tenth of the
 bandwidth of the laws with a model.
+
+**Equal ripple** (``--noise-ripple``), for fair comparisons: each law has one free parameter, the
+largest with which no axis exceeds the share of its largest force by noise (`ripple`):
+
+- W of the laws without an estimate, and of `indi` in a set with a constant h_bar;
+- the weight of the pair's low-pass of the laws with time-delay estimation, which they share, with
+  that of TDE-TSMC; W follows from it by step 4;
+- the weight of `dob`, W likewise, and omega_o of `adrc`, omega_c likewise.
+
+The laws with time-delay estimation have half of the variance by their linear part. The other half
+is left to their switching terms: K_1, K_2 and g are those of an error ``c eps``, c <= 1, with which
+the law itself, run on the held robot, has the ripple. A law remains below the share where lag or
+period end its range. `indi` in a set with a constant h_bar exceeds it where its estimate does so
+behind the low-pass of the set, whatever W; it then has the W of the method.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -69,8 +84,6 @@ from numpy.typing import NDArray
 
 from space_robot_control.laws import laws
 
-from .demand import ForceDemand
-from .equal_ripple import bandwidth_at_ripple, estimate_at_ripple, with_quiet_switching
 from .estimate_design import (
     EstimateDesign,
     check_estimate,
@@ -80,74 +93,58 @@ from .estimate_design import (
     nominal_estimate,
     with_weight,
 )
-from .laws_with_estimate import tune_dob, tune_indi, tune_tde_smc, tune_tde_stc, tune_tde_tsmc
-from .laws_with_model import tune_ctc, tune_ctc_smc, tune_pd, tune_slotine_li
-from .laws_with_observer import tune_adrc
+from .inertia import Posture
+from .law_gains import (
+    WITH_ESTIMATE,
+    WITHOUT_ESTIMATE,
+    WITHOUT_MODEL,
+    TunedLaw,
+    tune_adrc,
+    tune_dob,
+    tune_indi,
+    tune_tde_tsmc,
+)
 from .noise import Noise
-from .noise_limits import low_pass_corner
-from .postures import Posture
-from .task import AUTO, CONSTANT, NOMINAL, TunedLaw, TuningOptions, TuningTask, axis_inertia
+from .ripple import LEAST_WEIGHT, largest_quiet, linear_ripple, switching_ripple
+from .task import AUTO, CONSTANT, NOMINAL, ForceDemand, TuningOptions, TuningTask, axis_inertia
 
 Array = NDArray[np.float64]
 
 DIGITS = 3
 """Significant digits of a gain: few enough to be equal on all machines."""
-WITH_ESTIMATE: Mapping[str, Callable[[TuningTask, EstimateDesign], TunedLaw]] = {
-    "tde_smc": tune_tde_smc,
-    "tde_tsmc": tune_tde_tsmc,
-    "tde_stc": tune_tde_stc,
-}
-"""Laws with the estimate of the set."""
-WITHOUT_ESTIMATE: Mapping[str, Callable[[TuningTask, float], TunedLaw]] = {
-    "ctc": tune_ctc,
-    "ctc_smc": tune_ctc_smc,
-    "slotine_li": tune_slotine_li,
-    "pd": tune_pd,
-    "pd_feedforward": tune_pd,
-}
-"""Laws with W alone."""
-WITHOUT_MODEL = ("pd", "pd_feedforward")
-"""Those whose K_P and K_D have the inertia d in place of the model's."""
+LEAST_BANDWIDTH = 1e-3
+"""Smallest W, rad/s."""
+LEAST_SHARE = 1e-6
+"""Smallest c of the switching terms."""
+LINEAR_SHARE = 0.5
+"""Share of the variance that the linear part of a law with switching terms has."""
 
 
 @dataclass(frozen=True)
 class Tuned:
     """A gain set, with intermediate results of the method."""
 
-    wishes: TuningOptions
+    options: TuningOptions
+    design: EstimateDesign
+    """The time-delay estimate of the set."""
+    constant: EstimateDesign
+    """The estimate with a constant h_bar, whether it is used or not."""
     corner_hz: float
     """Corner of the low-pass of the time-delay pair, Hz."""
-    delay: float
-    """T of step 4, s."""
-    bandwidth: float
-    """W of the laws with time-delay estimation, rad/s."""
-    model_bandwidth: float
-    """W of the laws with a model, rad/s."""
-    smallest: float
-    """Smallest eigenvalue of ``H_S^-1 H^`` with nominal masses and every payload."""
-    largest: float
-    """Largest eigenvalue of the same."""
-    error: Array
-    """(m,) eps of step 5, rad/s2 (eps: 1/s2)."""
-    gains: Mapping[str, Mapping[str, Array]]
-    """Gains by law and name, (m,) each."""
-    h_bar: str = CONSTANT
-    """Inertia of the laws with time-delay estimation, `CONSTANT` or `NOMINAL`."""
-    switching: float = 1.0
-    """Share of the estimate's error that eps is, so that switching keeps to the ripple."""
-    constant: EstimateDesign | None = None
-    """The estimate with a constant h_bar, whether it is used or not."""
-    bandwidths: Mapping[str, float] = field(default_factory=dict)
-    """W by law, rad/s."""
-    remarks: Mapping[str, Sequence[str]] = field(default_factory=dict)
-    """On the gains of some laws, for their files."""
+    laws: Mapping[str, TunedLaw]
+    """Gains, rounded, by law."""
+
+    @property
+    def model_bandwidth(self) -> float:
+        """W of the laws with a model, rad/s."""
+        return self.laws["ctc"].bandwidth
 
 
 def tune(
     inertia: Array,
     postures: Sequence[Posture],
-    asked: ForceDemand,
-    wishes: TuningOptions,
+    demand: ForceDemand,
+    options: TuningOptions,
     period: float,
     noise: Noise | None = None,
     has_gears: bool = False,
@@ -157,76 +154,101 @@ def tune(
     Args:
         inertia: (L, m, m) H_S in all configurations, with all payloads.
         postures: (K,) of the nominal robot in the same configurations; L is a multiple of K.
-        asked: forces of the mission.
-        wishes: the user's tuning options.
+        demand: forces of the mission.
+        options: requirements of the user.
         period: delta, s.
         noise: of sensors and navigation, and its lag (None: no noise, no lag).
         has_gears: whether the inertia is also that of motors without the links behind their gears.
 
     Raises:
-        InputError: the tuning options cannot be met together.
+        InputError: the requirements cannot be met together.
     """
-    on_all_axes = asked.on_all_axes(axis_inertia(inertia))
-    task = TuningTask(inertia, postures, on_all_axes, wishes, period, noise, has_gears)
-    has_ripple = bool(wishes.noise_ripple and noise and noise.rates.any())
-    constant = constant_estimate(task)
-    observer = estimate_at_ripple(task, constant, True) if has_ripple else constant
+    on_all_axes = demand.on_all_axes(axis_inertia(inertia))
+    task = TuningTask(inertia, postures, on_all_axes, options, period, noise, has_gears)
+    has_ripple = bool(options.noise_ripple and noise and noise.rates.any())
+    constant = first = constant_estimate(task)
+    observer = _estimate_at_ripple(task, first, for_observer=True) if has_ripple else first
     if has_ripple:
-        constant = estimate_at_ripple(task, constant)
+        constant = _estimate_at_ripple(task, first)
     elif has_gears:  # the low-pass is also that of `indi`, whose inertia is far above the motors'
-        weight = min(constant.weight, nominal_estimate(task).weight)
-        constant = with_weight(task, constant, weight)
-    design, is_auto = constant, wishes.h_bar == AUTO
-    if wishes.h_bar == NOMINAL or (is_auto and is_weak(constant, task)):
+        constant = with_weight(task, first, min(first.weight, nominal_estimate(task).weight))
+    design = constant
+    if options.h_bar == NOMINAL or (options.h_bar == AUTO and is_weak(constant, task)):
         design = nominal_estimate(task)
-        design = estimate_at_ripple(task, design) if has_ripple else design
+        design = _estimate_at_ripple(task, design) if has_ripple else design
     check_estimate(task, design)
     tuned = {
-        name: with_quiet_switching(task, name, own, design) if has_ripple else own(task, design)
-        for name, own in WITH_ESTIMATE.items()
+        name: _with_quiet_switching(task, name, design) if has_ripple else rule(task, design)
+        for name, rule in WITH_ESTIMATE.items()
     }
-    for name, tune_law in WITHOUT_ESTIMATE.items():
-        if name in laws():
-            most = model_bandwidth(task, task.shape if name in WITHOUT_MODEL else None)
-            if has_ripple:
-                most = bandwidth_at_ripple(task, name, partial(tune_law, task), most)
-            tuned[name] = tune_law(task, most)
-    of_model = tuned["ctc"].bandwidth
+    for name, simple_rule in WITHOUT_ESTIMATE.items():
+        if name not in laws():
+            continue
+        own_rule = partial(simple_rule, task)
+        most = model_bandwidth(task, task.shape if name in WITHOUT_MODEL else None)
+        if has_ripple:
+            most = _bandwidth_at_ripple(task, name, own_rule, most)
+        tuned[name] = own_rule(most)
     incremental = nominal_estimate(task, design.weight)
-    tuned["indi"] = tune_indi(task, incremental)
+    of_indi, most = partial(tune_indi, task, incremental), incremental.bandwidth
     if has_ripple and design.kind == CONSTANT:
-        most = bandwidth_at_ripple(
-            task,
-            "indi",
-            lambda bandwidth: tune_indi(task, incremental, bandwidth),
-            incremental.bandwidth,
-            design.weight,
-        )
-        tuned["indi"] = tune_indi(task, incremental, most)
+        most = _bandwidth_at_ripple(task, "indi", of_indi, most, design.weight)
+    tuned["indi"] = of_indi(most)
     tuned["dob"] = tune_dob(task, observer)
-    tuned["adrc"] = tune_adrc(task, replace(constant, weight=constant_estimate(task).weight))
-    return Tuned(
-        wishes,
-        float(significant(low_pass_corner(design.weight, period))),
-        design.delay,
-        design.bandwidth,
-        of_model,
-        design.smallest,
-        design.largest,
-        design.error,
-        {
-            law: {name: significant(values) for name, values in own.gains.items()}
-            for law, own in tuned.items()
-        },
-        design.kind,
-        design.switching,
-        constant,
-        {law: own.bandwidth for law, own in tuned.items()},
-        {law: own.remarks for law, own in tuned.items()},
-    )
+    tuned["adrc"] = tune_adrc(task, replace(constant, weight=first.weight))
+    weight = design.weight
+    corner = 0.0 if weight >= 1.0 else -math.log(1.0 - weight) / (2.0 * math.pi * period)
+    rounded = {
+        name: replace(law, gains={key: significant(values) for key, values in law.gains.items()})
+        for name, law in tuned.items()
+    }
+    return Tuned(options, design, constant, float(significant(corner)), rounded)
 
 
 def significant(values: Array | float) -> Array:
     """Round to `DIGITS` significant digits."""
     rounded: Array = np.vectorize(lambda value: float(f"{value:.{DIGITS}g}"))(values)
     return rounded
+
+
+def _bandwidth_at_ripple(
+    task: TuningTask, law: str, rule: Callable[[float], TunedLaw], most: float, weight: float = 1.0
+) -> float:
+    def ripple(bandwidth: float) -> Array:
+        return linear_ripple(task, law, rule(bandwidth).gains, weight)
+
+    if np.any(ripple(LEAST_BANDWIDTH) > task.allowed):
+        return most
+    return largest_quiet(LEAST_BANDWIDTH, most, ripple, task.allowed)
+
+
+def _estimate_at_ripple(
+    task: TuningTask, design: EstimateDesign, for_observer: bool = False
+) -> EstimateDesign:
+    """Return an estimate with the largest weight of its low-pass, at most that of ``design``.
+
+    ``for_observer``: for `dob` in place of the laws with time-delay estimation.
+    """
+    if not for_observer:
+        linear = task.options.allowed_ripple * LINEAR_SHARE**0.5
+        task = replace(task, options=replace(task.options, noise_ripple=linear))
+
+    def ripple(weight: float) -> Array:
+        own = with_weight(task, design, weight)
+        if for_observer:
+            return linear_ripple(task, "dob", tune_dob(task, own).gains)
+        return linear_ripple(task, "tde_tsmc", tune_tde_tsmc(task, own).gains, weight)
+
+    weight = largest_quiet(LEAST_WEIGHT, design.weight, ripple, task.allowed)
+    return with_weight(task, design, weight)
+
+
+def _with_quiet_switching(task: TuningTask, law: str, design: EstimateDesign) -> TunedLaw:
+    def with_share(share: float) -> TunedLaw:
+        own = replace(design, gap=share * design.gap, error=share * design.error)
+        return WITH_ESTIMATE[law](task, own)
+
+    def ripple(share: float) -> Array:
+        return switching_ripple(task, law, with_share(share).gains, design.weight)
+
+    return with_share(largest_quiet(LEAST_SHARE, 1.0, ripple, task.allowed))

@@ -2,16 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import astuple, dataclass
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .demand import ForceDemand
+from space_robot_control.guidance.mission import MissionSettings
+from space_robot_model.dynamics.attitude import rotation_matrix
+from space_robot_model.dynamics.rho_space import RhoSpaceModel, rho_space_into
+from space_robot_model.robot import Robot
+from space_robot_sim.component import Installation
+from space_robot_sim.environment.disturbance import Disturbance, disturbance_torque
+from space_robot_sim.environment.environment import EnvironmentSettings, with_payload
+from space_robot_sim.environment.friction import coefficients
+
+from .inertia import J0, SAMPLING, Posture, sampled_reference
 from .noise import Noise
-from .postures import Posture
 from .spectrum import eigenvalues
 
 Array = NDArray[np.float64]
@@ -24,6 +32,8 @@ MOST_BY_MODEL = 0.25
 """Largest bandwidth times period times eigenvalue of ``H_S^-1`` with the model's inertia, rad."""
 MOST_PER_TICK = 0.05
 """Largest bandwidth times period, rad: K_D then removes a tenth of a rate error per tick."""
+NEGLIGIBLE = 1e-9
+"""Accelerations below this fraction of the largest one are rounding errors."""
 
 
 @dataclass(frozen=True)
@@ -42,7 +52,7 @@ class TuningOptions:
     """Inertia of the laws with time-delay estimation: `CONSTANT`, `NOMINAL`, or `AUTO`, the nominal
     one where no diagonal matrix will do."""
     noise_ripple: float | None = None
-    """If set, every law has this ripple in place of at most ``ripple``, see `equal_ripple`."""
+    """If set, every law has this ripple in place of at most ``ripple``, see `method`."""
 
     @property
     def allowed_ripple(self) -> float:
@@ -58,9 +68,9 @@ class TuningTask:
     """(L, m, m) H_S in all configurations, with all payloads; L is a multiple of K."""
     postures: Sequence[Posture]
     """(K,) of the nominal robot in the same configurations."""
-    asked: ForceDemand
+    demand: ForceDemand
     """Forces of the mission, on all axes."""
-    wishes: TuningOptions
+    options: TuningOptions
     period: float
     """s."""
     noise: Noise | None
@@ -92,24 +102,12 @@ class TuningTask:
     @property
     def allowed(self) -> Array:
         """(m,) RMS force that noise may cause, N m."""
-        return self.wishes.allowed_ripple * self.asked.peak
+        return self.options.allowed_ripple * self.demand.peak
 
     @property
     def lag(self) -> float:
         """Of the navigation, s."""
         return self.noise.lag if self.noise else 0.0
-
-
-@dataclass(frozen=True)
-class TunedLaw:
-    """Gains of one law."""
-
-    gains: Mapping[str, Array]
-    """By name, (m,) each."""
-    bandwidth: float
-    """W, rad/s."""
-    remarks: Sequence[str] = ()
-    """On these gains, for their file."""
 
 
 def axis_inertia(inertia: Array) -> Array:
@@ -119,6 +117,87 @@ def axis_inertia(inertia: Array) -> Array:
     return smallest
 
 
-def critical(bandwidth: float, axes: int) -> dict[str, Array]:
-    """Return K_P and K_D (m,) with both poles of each axis at ``bandwidth``, rad/s."""
-    return {"k_p": np.full(axes, bandwidth**2), "k_d": np.full(axes, 2.0 * bandwidth)}
+@dataclass(frozen=True)
+class ForceDemand:
+    """Generalised forces F_S needed to follow a mission's reference, per axis (m,), N m."""
+
+    peak: Array
+    """Largest |F_S| over all environments."""
+    slope: Array
+    """Largest |dF_S/dt| without Coulomb friction, which has steps; N m/s."""
+    unknown: Array
+    """Largest difference from F_S of the nominal robot without environment."""
+    nominal: Array
+    """Largest |F_S| of the nominal robot without environment."""
+
+    def on_all_axes(self, inertia: Array) -> ForceDemand:
+        """Return the demand with nonzero values on the axes that the mission does not move.
+
+        A planar motion would otherwise lead to zero gains on some axes. They get the force for the
+        smallest acceleration of the other axes.
+
+        Args:
+            inertia: (m,) of each axis, kg m2.
+        """
+        return ForceDemand(*(_filled(force, inertia) for force in astuple(self)))
+
+
+def _filled(force: Array, inertia: Array) -> Array:
+    acceleration = force / inertia
+    is_needed = acceleration > NEGLIGIBLE * acceleration.max()
+    least = np.min(acceleration, where=is_needed, initial=np.inf)
+    return np.where(is_needed, force, inertia * least) if is_needed.any() else force
+
+
+def force_demand(
+    robot: Robot, mission: MissionSettings, cases: Sequence[EnvironmentSettings]
+) -> ForceDemand:
+    """Return the largest forces of a mission over all ``cases``.
+
+    Args:
+        robot: the nominal robot.
+        mission: settings of the reference.
+        cases: environments with friction, disturbance and payload.
+    """
+    nominal = _smooth_force(robot, mission)
+    smooth = [_smooth_force(with_payload(robot, case.payload), mission, case) for case in cases]
+    coulomb = [_coulomb(robot, mission, case) for case in cases]
+    whole = [force + friction for force, friction in zip(smooth, coulomb, strict=True)]
+    slopes = [np.abs(np.diff(force, axis=0)).max(axis=0) / SAMPLING for force in smooth]
+    return ForceDemand(
+        peak=np.max([np.abs(force).max(axis=0) for force in whole], axis=0),
+        slope=np.max(slopes, axis=0),
+        unknown=np.max([np.abs(force - nominal).max(axis=0) for force in whole], axis=0),
+        nominal=np.abs(nominal).max(axis=0),
+    )
+
+
+def _smooth_force(
+    robot: Robot, settings: MissionSettings, case: EnvironmentSettings | None = None
+) -> Array:
+    """Return F_S (K, m) every `SAMPLING` s, without Coulomb friction; passive joints locked."""
+    robot = robot.nominal
+    chunk = sampled_reference(robot, settings)
+    count = len(chunk.joints)
+    rotation, model = np.empty((3, 3)), RhoSpaceModel.allocate(robot.n)
+    as_desired = np.array([1.0, 0.0, 0.0, 0.0])
+    disturbance = Disturbance.build(case.disturbance, Installation(robot.n)) if case else None
+    force, torque = np.empty((count, robot.n + 3)), np.zeros(robot.n + 3)
+    viscous = coefficients(robot, case.friction)[:, 1] if case else np.zeros(robot.n)
+    for k, (theta, rates, accelerations) in enumerate(chunk.joints):
+        omega, alpha = chunk.base[k, 4:7], chunk.base[k, 7:]
+        rho_space_into(robot.model, as_desired, theta, omega, rates, omega, alpha, model)
+        force[k] = model.inertia[:, 3:] @ accelerations + model.bias
+        if case and disturbance is not None:
+            disturbance_torque(disturbance, k * SAMPLING, torque)
+            rotation_matrix(chunk.base[k, :4], rotation)
+            force[k, :3] += rotation.T @ torque[:3] / J0
+            force[k, 3:] += torque[3:] + viscous * rates
+    return force
+
+
+def _coulomb(robot: Robot, settings: MissionSettings, case: EnvironmentSettings) -> Array:
+    rates = sampled_reference(robot, settings).joints[:, 1]
+    force = np.zeros((len(rates), robot.n + 3))
+    force[:, 3:] = coefficients(robot, case.friction)[: robot.n, 0] * np.sign(rates)
+    return force

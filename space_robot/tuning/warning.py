@@ -16,14 +16,16 @@ from space_robot_model.robot import Robot
 from space_robot_msgs_py.errors import InputError
 
 from .closed_loop import RigidLoop
-from .estimate_design import MUCH_SLOWER
 from .gain_check import estimate_spectrum
-from .inertia import inertia_along, sampled_reference, semi_floating_inertia
+from .inertia import (
+    Posture,
+    inertia_along,
+    postures_along,
+    sampled_reference,
+    semi_floating_inertia,
+)
 from .linear_law import linear_law
-from .method import Tuned
-from .postures import Posture, postures_along
 from .spectrum import LEAST_MARGIN
-from .task import AUTO, NOMINAL
 
 Array = NDArray[np.float64]
 
@@ -111,36 +113,6 @@ def _why_it_is_unsound(
     return (
         f"{name} leaves {margin} of margin in torque scale, "
         f"at least {LEAST_MARGIN:.0%} is recommended"
-    )
-
-
-def estimate_remark(tuned: Tuned) -> str:
-    """Return a remark if a constant h_bar does not suit a set's robot; else empty.
-
-    Its laws with time-delay estimation are then weak, with less than a tenth of the bandwidth of
-    those with a model, or they have the nominal inertia.
-    """
-    if tuned.h_bar == NOMINAL:
-        if tuned.wishes.h_bar != AUTO or tuned.constant is None:
-            return ""
-        return (
-            "The laws with time-delay estimation use the inertia of the nominal model (h_bar: "
-            "nominal), because no diagonal h_bar suits light and heavy directions of this robot at "
-            f"once: eigenvalues of H_S^-1 h_bar would be {tuned.constant.smallest:.2g} to "
-            f"{tuned.constant.largest:.3g}, with {tuned.constant.bandwidth:.2g} rad/s. dob and "
-            "adrc, whose inertia is a diagonal, too, are weak: "
-            f"{tuned.bandwidths['dob']:.2g} and {tuned.bandwidths['adrc']:.2g} rad/s."
-        )
-    if tuned.bandwidth >= MUCH_SLOWER * tuned.model_bandwidth:
-        return ""
-    return (
-        f"The laws with time-delay estimation are weak: {tuned.bandwidth:.2g} rad/s, those with a "
-        f"model {tuned.model_bandwidth:.2g}. Eigenvalues of H_S^-1 h_bar are {tuned.smallest:.2g} "
-        f"to {tuned.largest:.3g} (no diagonal h_bar suits light and heavy directions at once), so "
-        f"the estimate needs a low-pass and lags by {tuned.delay * 1e3:.3g} ms. What helps: the "
-        "inertia of the nominal model (gains tune --h-bar nominal); ctc or ctc_smc; panels on "
-        "hinges without motors as passive joints; a smaller margin or mass uncertainty (--margin, "
-        "--mass-uncertainty), where drives and masses are known that well; a shorter period."
     )
 
 

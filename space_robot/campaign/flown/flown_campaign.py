@@ -20,7 +20,7 @@ from space_robot_msgs_py.config.validation import one_of, validate
 from space_robot_msgs_py.errors import InputError
 
 from ...api import FlownFlight, Scenario
-from ...api.in_process import fly_in_process
+from ...api.flown_flight import fly_in_process
 from ..row.fly import RowFlyer
 from ..row.row import Task
 from ..store.folder import MANIFEST, STUDY, TABLE, check_regular, study_changes

@@ -33,9 +33,8 @@ from ...console.files import atomic_folder
 from ...flight.plan import Flight, Scenario, resolve
 from ...flight.simulate import simulate
 from ...processes.pool import cores, run_all
-from ...tuning.demand import demand
-from ...tuning.task import AUTO, TuningOptions
-from ...tuning.warning import estimate_remark
+from ...tuning.gain_file import estimate_remark
+from ...tuning.task import AUTO, TuningOptions, force_demand
 from ..gain_set import tuned_set, write_set
 from .texts import CAMPAIGN_FILE, ROBOT_FILE, campaign_text
 
@@ -81,7 +80,7 @@ def rest_to_rest(robot: Robot) -> MissionSettings:
     points = np.array([start, start + signs * way, start - 0.5 * signs * way])
     longest = np.abs(np.diff(points, axis=0)).max(axis=0)
     leg = max(LEG_S, float(np.max(PEAK_VELOCITY * longest / (OF_THE_LIMITS * velocity))))
-    asked = demand(nominal, _mission(robot, points, leg), [EnvironmentSettings()]).nominal[3:]
+    asked = force_demand(nominal, _mission(robot, points, leg), [EnvironmentSettings()]).nominal[3:]
     leg *= max(1.0, math.sqrt(float(np.max(asked / (OF_THE_LIMITS * effort)))))
     leg = math.ceil(leg)
     if leg > LONGEST_LEG_S:
@@ -209,7 +208,7 @@ def make_robot(
         write_set(tuned, command, place / OWN_GAINS / SET)
         default = f"# The set of each law.\n{OTHERS}: {SET}\n"
         (place / OWN_GAINS / DEFAULT_SETS).write_text(default, "utf-8")
-        names = sorted(tuned.gains)
+        names = sorted(tuned.laws)
         step(f"flying {', '.join(names)}")
         flights = dict(zip(names, run_all(partial(_fly, place), names, cores()), strict=True))
         best = min(names, key=lambda law: flights[law].score)

@@ -13,11 +13,10 @@ from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.config.validation import one_of
 from space_robot_msgs_py.errors import InputError
 
-from ...analysis.analysed_log import AnalysedLog
+from ...analysis.analysed_log import AnalysedLog, PointingBudget
 from ...analysis.measure import Window, evaluate, group_of, names
 from ...analysis.own_metric import OwnMetric
 from ...analysis.pointing import lacking_for_jitter
-from ...analysis.pointing_budget import PointingBudget
 from ...analysis.series import GROUPS, SeriesGroup
 from ...analysis.tool_path import leads_tool
 from ...analysis.torques import lacking_for_ripple

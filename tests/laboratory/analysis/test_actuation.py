@@ -18,7 +18,7 @@ from space_robot import Scenario
 from space_robot.analysis import analyze, measure
 from space_robot.analysis.actuation import standing
 from space_robot.analysis.analysed_log import AnalysedLog
-from space_robot.analysis.sizing_table import sizing_table
+from space_robot.analysis.report_tables import sizing_table
 from space_robot.analysis.words import of_statistic, remarks
 from space_robot_model.hardware.base_actuators import BaseActuatorSettings
 from space_robot_model.robot import Robot

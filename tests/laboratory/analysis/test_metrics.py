@@ -33,8 +33,7 @@ from space_robot.analysis.figures.flight_curves import FlightCurves
 from space_robot.analysis.figures.style import LineStyle
 from space_robot.analysis.measure import all_metrics, label, names
 from space_robot.analysis.report_tables import comparison_table, rms_table
-from space_robot.analysis.spectrum import hann, segment_spectra
-from space_robot.analysis.torques import desired_torque, ripple_spectrum
+from space_robot.analysis.torques import desired_torque, hann, ripple_spectrum, segment_spectra
 from space_robot.analysis.words import notes, of_statistic, remarks
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.errors import InputError

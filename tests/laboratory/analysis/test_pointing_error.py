@@ -18,10 +18,9 @@ from strategies import random_quaternion, random_robot
 import space_robot as sr
 from space_robot import Scenario
 from space_robot.analysis import analyze, measure
-from space_robot.analysis.analysed_log import ANGLES, AnalysedLog
+from space_robot.analysis.analysed_log import ANGLES, AnalysedLog, PointingBudget, pointed_axis
 from space_robot.analysis.errors import attitude_error, rotation_vectors
 from space_robot.analysis.pointing import ARCSEC, end_effector, errors
-from space_robot.analysis.pointing_budget import PointingBudget, pointed_axis
 from space_robot.analysis.tool_path import ToolPath, leads_tool
 from space_robot.analysis.words import remarks
 from space_robot_model.robot import Robot

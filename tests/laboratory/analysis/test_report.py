@@ -44,9 +44,6 @@ def test_a_report_does_not_depend_on_the_blocks(monkeypatch: pytest.MonkeyPatch)
         for name, value in expected["metrics"].items():
             close = pytest.approx(value, rel=1e-9, abs=1e-12)
             assert found["metrics"][name] == close, name
-        for key in ("peak_torque_n_m", "peak_momentum_n_m_s", "angular_impulse_n_m_s"):
-            one, other = (r["sizing"]["axes"]["base_x"][key] for r in (found, expected))
-            assert one == pytest.approx(other, rel=1e-9)
         for key in found.keys() - {"metrics", "sizing"}:
             assert found[key] == expected[key], key
 
@@ -187,12 +184,7 @@ def test_motors_that_the_robot_has_not_are_told(driven: FlightLog) -> None:
         momentum_of(other)
 
 
-def test_a_name_of_a_file_is_no_number(driven: FlightLog) -> None:
-    """Numbers come before the file's name, whose file may be elsewhere."""
-    parameters = {"robot": "paper", "orbit": "gone.yaml", "orbital_elements.height": HEIGHT}
-    flight = {**driven.flight, "parameters": {"plant": parameters}}
-    few = replace(driven, flight=flight, trusted=True)
-    assert orbit_of(few).orbital_elements.height == HEIGHT
+def test_a_file_that_a_bag_names_is_not_read(driven: FlightLog) -> None:
     flight = {**driven.flight, "parameters": {"plant": {"orbit": "/etc/mine.yaml"}}}
     said = "refers to a file as its orbit, '/etc/mine.yaml'"
     assert said in json.dumps(analyze(replace(driven, flight=flight)))

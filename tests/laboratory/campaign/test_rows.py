@@ -11,8 +11,8 @@ import pytest
 from space_robot import FlownFlight, Scenario
 from space_robot.analysis import measure as measured_of
 from space_robot.analysis import tracking_error
+from space_robot.analysis.analysed_log import PointingBudget
 from space_robot.analysis.errors import attitude_drift
-from space_robot.analysis.pointing_budget import PointingBudget
 from space_robot.campaign.row import fly
 from space_robot.campaign.row.fly import RowFlyer
 from space_robot.campaign.row.measure import (

@@ -35,9 +35,11 @@ from space_robot.cli.new import new as new_command
 from space_robot.cli.new_files import LAW, METRIC, MISSION, SENSOR
 from space_robot.flight.plan import Flight, Scenario, resolve
 from space_robot.flight.simulate import simulate
+from space_robot.tuning.estimate_design import EstimateDesign
+from space_robot.tuning.gain_file import estimate_remark
+from space_robot.tuning.law_gains import TunedLaw
 from space_robot.tuning.method import Tuned
-from space_robot.tuning.task import TuningOptions
-from space_robot.tuning.warning import estimate_remark
+from space_robot.tuning.task import CONSTANT, TuningOptions
 from space_robot_control.guidance.mission import Mission
 from space_robot_control.laws import laws
 from space_robot_model.robot import Robot
@@ -324,9 +326,9 @@ def test_panels_on_hinges_are_proposed_as_passive_joints(tmp_path: Path) -> None
 
 @pytest.mark.parametrize(("slower", "is_told"), [(1.01, False), (9.9, False), (10.1, True)])
 def test_weak_gains_are_told_with_their_reason(slower: float, is_told: bool) -> None:
-    tuned = Tuned(
-        TuningOptions(0.05, 0.2), 1.0, 0.0123, 5.0, 5.0 * slower, 0.06, 120.0, np.ones(9), {}
-    )
+    ones, laws = np.ones(9), {"ctc": TunedLaw({}, 5.0 * slower)}
+    design = EstimateDesign(CONSTANT, ones, 0.06, 120.0, 1.0, 0.0123, 5.0, 5.0, ones, ones)
+    tuned = Tuned(TuningOptions(0.05, 0.2), design, design, 1.0, laws)
     remark = estimate_remark(tuned)
     assert bool(remark) == is_told
     if is_told:

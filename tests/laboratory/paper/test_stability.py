@@ -16,7 +16,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from oracles import rho_space_inertia
 
-from space_robot.analysis.generalised_motion import continuous_error, mean_acceleration
+from space_robot.analysis.errors import continuous_error, mean_acceleration
 from space_robot.cli.main import cli
 from space_robot.flight.plan import Flight, Scenario, resolve
 from space_robot.flight.simulate import simulate

@@ -12,8 +12,9 @@ from scipy.spatial.transform import Rotation
 from strategies import State, random_quaternion, random_robot
 
 from space_robot.analysis.mission_plan import planned_segments
-from space_robot.flight.plan import Flight, Scenario, resolve
-from space_robot.tuning.demand import demand
+from space_robot.flight.plan import Flight
+from space_robot.flight.plan import Scenario
+from space_robot.flight.plan import resolve
 from space_robot.tuning.inertia import (
     SAMPLING,
     free_inertia,
@@ -23,6 +24,7 @@ from space_robot.tuning.inertia import (
     sampled_reference,
     semi_floating_inertia,
 )
+from space_robot.tuning.task import force_demand
 from space_robot_control.guidance.mission import Mission, MissionSettings
 from space_robot_model.robot import Robot
 from space_robot_model.robot.dynamics import mass_matrix
@@ -43,13 +45,13 @@ def mission() -> MissionSettings:
 
 def test_friction_is_asked_of_the_joints_by_their_rates(paper_robot: Robot) -> None:
     rates = sampled_reference(paper_robot, mission()).joints[:, 1]
-    found = demand(
+    found = force_demand(
         paper_robot, mission(), [case(), case(friction={"coulomb": 0.3, "viscous": 0.7})]
     )
     friction = np.max(np.abs(0.3 * np.sign(rates) + 0.7 * rates), axis=0)
     np.testing.assert_allclose(found.unknown, [0.0, 0.0, 0.0, *friction], atol=1e-12)
     smooth, rough = (
-        demand(paper_robot, mission(), [one])
+        force_demand(paper_robot, mission(), [one])
         for one in (case(), case(friction={"coulomb": 5.0, "viscous": 0.0}))
     )
     np.testing.assert_array_equal(rough.slope, smooth.slope)  # its jumps left out
@@ -64,8 +66,8 @@ def test_the_worst_case_counts_axis_by_axis(paper_robot: Robot, order: int) -> N
         case(disturbance={"scale": 1.0, "base_amplitude": 5.0}),
         case(friction={"coulomb": 0.0, "viscous": 9.0}),
     ]
-    both = demand(paper_robot, mission(), cases[::order])
-    alone = [demand(paper_robot, mission(), [one]) for one in cases]
+    both = force_demand(paper_robot, mission(), cases[::order])
+    alone = [force_demand(paper_robot, mission(), [one]) for one in cases]
     for name in ("peak", "slope", "unknown"):
         worst = np.maximum(*(getattr(one, name) for one in alone))
         np.testing.assert_array_equal(getattr(both, name), worst)
@@ -77,7 +79,7 @@ def test_a_base_that_turns_asks_what_the_planner_says(paper_robot: Robot) -> Non
     """A segment that turns the base by 40 degrees; eps is half of an angle, so F is 2 torques."""
     segments = ["{base: {rpy_deg: [10, 40, -20]}, duration: 12}"]
     turning = MissionSettings(joints_deg=[0, 90, 200, 20, 30, 10], segments=segments)
-    found = demand(paper_robot, turning, [case()])
+    found = force_demand(paper_robot, turning, [case()])
     flown = Mission(paper_robot, turning, SAMPLING)
     (planned,) = planned_segments(paper_robot, flown)
     torque = np.abs(planned.demand.torque).max(axis=0)
@@ -98,7 +100,7 @@ def test_disturbances_about_inertial_axes_are_turned_to_the_bases(vector: list[f
     x, y, z, w = attitude.as_quat()
     place = [10.0, 50.0, 90.0, 20.0, 30.0, 40.0]
     still = MissionSettings(joints_deg=place, segments=["{hold: 4}"], base_quaternion=[w, x, y, z])
-    found = demand(find_robot("paper"), still, [case(disturbance={"scale": 1.0})])
+    found = force_demand(find_robot("paper"), still, [case(disturbance={"scale": 1.0})])
     time = 0.05 * np.arange(81)
     wave = np.sin(2 * np.pi * 0.5 * time) + np.sin(2 * np.pi * 0.75 * time)
     torque = attitude.inv().apply(np.full(3, 0.010))

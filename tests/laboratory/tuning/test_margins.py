@@ -18,11 +18,9 @@ from space_robot.flight.plan import Flight, Scenario, resolve
 from space_robot.flight.simulate import simulate
 from space_robot.tuning.closed_loop import RigidLoop, loop_of, rigid_motion
 from space_robot.tuning.gain_check import GainCheck, check_gains, noise_gain, pair_corner
-from space_robot.tuning.inertia import SAMPLING, inertia_along
+from space_robot.tuning.inertia import SAMPLING, Posture, inertia_along, postures_along, postures_at
 from space_robot.tuning.linear_law import LinearLaw, force_by_rate, linear_law, linear_laws
-from space_robot.tuning.mass_errors import check_masses, drawn_inertias
-from space_robot.tuning.postures import Posture, postures_along, postures_at
-from space_robot.tuning.spectrum import eigenvalues, spectrum
+from space_robot.tuning.spectrum import check_masses, drawn_inertias, eigenvalues, spectrum
 from space_robot.tuning.warning import margin_remarks
 from space_robot_control.controller.settings import ControllerNodeSettings
 from space_robot_control.laws import ControlLaw, LawGains, Signals, find_law, per_axis

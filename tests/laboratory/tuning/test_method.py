@@ -11,17 +11,26 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from space_robot.flight.plan import Flight, Scenario, resolve
-from space_robot.tuning.demand import ForceDemand, demand
-from space_robot.tuning.equal_ripple import LINEAR_SHARE
-from space_robot.tuning.held_ripple import law_ripple
-from space_robot.tuning.inertia import SAMPLING, inertia_along
-from space_robot.tuning.method import Tuned, tune
+from space_robot.flight.plan import Flight
+from space_robot.flight.plan import Scenario
+from space_robot.flight.plan import resolve
+from space_robot.tuning.inertia import SAMPLING
+from space_robot.tuning.inertia import inertia_along
+from space_robot.tuning.method import Tuned
+from space_robot.tuning.method import tune
+from space_robot.tuning.inertia import Posture
+from space_robot.tuning.inertia import postures_along
+from space_robot.tuning.method import LINEAR_SHARE
 from space_robot.tuning.noise import Noise, listen
-from space_robot.tuning.postures import Posture, postures_along
+from space_robot.tuning.ripple import linear_ripple, switching_ripple
 from space_robot.tuning.spectrum import eigenvalues
-from space_robot.tuning.switching_ripple import switching_ripple
-from space_robot.tuning.task import TuningOptions, TuningTask, axis_inertia
+from space_robot.tuning.task import (
+    ForceDemand,
+    TuningOptions,
+    TuningTask,
+    axis_inertia,
+    force_demand,
+)
 from space_robot_msgs_py.errors import InputError
 
 Array = np.ndarray
@@ -36,12 +45,16 @@ def scene(robot: str = "paper") -> tuple[Array, list[Posture], ForceDemand]:
     inertias = [inertia_along(x.plant.robot, first.mission_settings) for x in flights]
     cases = [x.plant_settings for x in flights]
     postures = postures_along(first.robot, first.mission_settings, SAMPLING)
-    return np.concatenate(inertias), postures, demand(first.robot, first.mission_settings, cases)
+    return (
+        np.concatenate(inertias),
+        postures,
+        force_demand(first.robot, first.mission_settings, cases),
+    )
 
 
-def tuned(wishes: TuningOptions, robot: str = "paper", lag: float = 0.0) -> Tuned:
+def tuned(options: TuningOptions, robot: str = "paper", lag: float = 0.0) -> Tuned:
     still = np.zeros((100, scene(robot)[0].shape[-1]))
-    return tune(*scene(robot), wishes, PERIOD, Noise(still, still, still, lag, PERIOD))
+    return tune(*scene(robot), options, PERIOD, Noise(still, still, still, lag, PERIOD))
 
 
 @pytest.mark.parametrize("robot", ["paper", "seven_joint"])
@@ -49,44 +62,44 @@ def tuned(wishes: TuningOptions, robot: str = "paper", lag: float = 0.0) -> Tune
 @pytest.mark.parametrize("share", [0.0, 0.2])
 def test_the_margin_is_left_with_the_worst_masses(robot: str, margin: float, share: float) -> None:
     found, (inertia, *_) = tuned(TuningOptions(margin, share), robot), scene(robot)
-    h_bar = np.asarray(found.gains["tde_stc"]["h_bar"])
+    h_bar = np.asarray(found.laws["tde_stc"].gains["h_bar"])
     heavy, light = (eigenvalues(factor * inertia, h_bar) for factor in (1.0 + share, 1.0 - share))
     assert heavy.min() == pytest.approx(margin, rel=0.01)  # gains are rounded
     weight = 1.0 - np.exp(-2.0 * np.pi * found.corner_hz * PERIOD) if found.corner_hz else 1.0
     assert weight * light.max() < 1.01
     for law in ("tde_smc", "tde_tsmc"):
-        np.testing.assert_array_equal(found.gains[law]["h_bar"], h_bar)
+        np.testing.assert_array_equal(found.laws[law].gains["h_bar"], h_bar)
 
 
 def test_poles_are_those_of_the_bandwidth() -> None:
     found = tuned(TuningOptions(0.05, 0.2))
-    assert found.bandwidth == pytest.approx(0.05 / found.delay / 4.0)
-    for law, bandwidth in (("tde_tsmc", found.bandwidth), ("ctc", found.model_bandwidth)):
-        roots = np.roots([1.0, *(float(found.gains[law][name][0]) for name in ("k_d", "k_p"))])
+    assert found.design.bandwidth == pytest.approx(0.05 / found.design.delay / 4.0)
+    for law, bandwidth in (("tde_tsmc", found.design.bandwidth), ("ctc", found.model_bandwidth)):
+        roots = np.roots([1.0, *(float(found.laws[law].gains[name][0]) for name in ("k_d", "k_p"))])
         assert np.abs(roots) == pytest.approx([bandwidth] * 2, rel=0.02)
     assert found.model_bandwidth == pytest.approx(0.05 / PERIOD)
     assert tuned(TuningOptions(0.05, 0.2), lag=0.02).model_bandwidth == pytest.approx(12.5)
     # with the lag of the estimate, a pole at margin / T
-    pole = 0.05 / found.delay
-    slow = np.roots([1.0 / pole, 1.0, 2.0 * found.bandwidth, found.bandwidth**2])
+    pole = 0.05 / found.design.delay
+    slow = np.roots([1.0 / pole, 1.0, 2.0 * found.design.bandwidth, found.design.bandwidth**2])
     pair = slow[np.abs(slow.imag) > 0.0]
     assert -pair[0].real / abs(pair[0]) == pytest.approx(0.7, abs=0.02)
 
 
 def test_conditions_of_the_laws_hold() -> None:
     found = tuned(TuningOptions(0.05, 0.2))
-    stc, smc, layer = (found.gains[law] for law in ("tde_stc", "tde_smc", "ctc_smc"))
-    rate = found.bandwidth * found.error
+    stc, smc, layer = (found.laws[law].gains for law in ("tde_stc", "tde_smc", "ctc_smc"))
+    rate = found.design.bandwidth * found.design.error
     assert np.all(stc["k_2"] > rate)
     assert np.all(stc["k_1"] ** 2 > 4.0 * stc["k_2"])
-    np.testing.assert_allclose(smc["g"], smc["h_bar"] * found.error, rtol=0.02)
+    np.testing.assert_allclose(smc["g"], smc["h_bar"] * found.design.error, rtol=0.02)
     inertia = scene()[0]
     inside = eigenvalues(0.8 * inertia, layer["g"] / layer["delta"])  # s fades with these, 1/s
     assert inside.max() == pytest.approx(found.model_bandwidth, rel=0.02)
 
 
 def test_a_bandwidth_beyond_the_estimates_is_refused() -> None:
-    assert tuned(TuningOptions(0.05, 0.2, bandwidth=3.0)).gains["ctc"]["k_p"][0] == 9.0
+    assert tuned(TuningOptions(0.05, 0.2, bandwidth=3.0)).laws["ctc"].gains["k_p"][0] == 9.0
     with pytest.raises(InputError, match=r"at most 13\.\d rad/s.*got 20"):
         tuned(TuningOptions(0.05, 0.2, bandwidth=20.0))
 
@@ -94,7 +107,7 @@ def test_a_bandwidth_beyond_the_estimates_is_refused() -> None:
 def test_adrc_has_less_inertia_where_its_three_poles_would_be_unstable() -> None:
     """``(s + omega_o)^3 = (1 - lambda) omega_o^3`` has no growing root for lambda below 9."""
     found = tuned(TuningOptions(0.05, 0.2), "seven_joint")
-    inertia, h_bar = found.gains["adrc"]["inertia"], found.gains["tde_stc"]["h_bar"]
+    inertia, h_bar = found.laws["adrc"].gains["inertia"], found.laws["tde_stc"].gains["h_bar"]
     assert np.all(np.asarray(inertia) < h_bar)
     largest = eigenvalues(0.8 * scene("seven_joint")[0], np.asarray(inertia)).max()
     assert largest == pytest.approx(5.0, rel=0.01)
@@ -104,25 +117,25 @@ def test_every_law_has_the_same_ripple_on_request() -> None:
     """On the limiting axis, with switching terms; and the same W where that is asked for."""
     inertia, postures, asked = scene()
     noise = white(3e-6, 3e-6, 1500)
-    wishes = TuningOptions(0.05, 0.2, noise_ripple=0.05)
-    found = tune(inertia, postures, asked, wishes, PERIOD, noise)
-    task = TuningTask(inertia, postures, asked, wishes, PERIOD, noise)
+    options = TuningOptions(0.05, 0.2, noise_ripple=0.05)
+    found = tune(inertia, postures, asked, options, PERIOD, noise)
+    task = TuningTask(inertia, postures, asked, options, PERIOD, noise)
     weight = 1.0 - np.exp(-2.0 * np.pi * found.corner_hz * PERIOD)
-    linear = law_ripple(task, "tde_tsmc", found.gains["tde_tsmc"], weight) / asked.peak
+    linear = linear_ripple(task, "tde_tsmc", found.laws["tde_tsmc"].gains, weight) / asked.peak
     assert linear.max() == pytest.approx(0.05 * LINEAR_SHARE**0.5, rel=0.05)
     for law in ("tde_smc", "tde_tsmc", "tde_stc"):
-        share = switching_ripple(task, law, found.gains[law], weight) / asked.peak
+        share = switching_ripple(task, law, found.laws[law].gains, weight) / asked.peak
         assert linear.max() < 1.05 * share.max() < 1.05 * 0.0525, law
-    largest = switching_ripple(task, "tde_smc", found.gains["tde_smc"], weight) / asked.peak
+    largest = switching_ripple(task, "tde_smc", found.laws["tde_smc"].gains, weight) / asked.peak
     assert largest.max() == pytest.approx(0.05, rel=0.05)  # its g had to be made smaller
     for law in ("ctc", "ctc_smc", "dob", "pd", "pd_feedforward"):
-        share = law_ripple(task, law, found.gains[law], weight) / asked.peak
-        is_at_limit = found.bandwidths[law] > 99.0
+        share = linear_ripple(task, law, found.laws[law].gains, weight) / asked.peak
+        is_at_limit = found.laws[law].bandwidth > 99.0
         assert share.max() == pytest.approx(0.05, rel=0.05) or (is_at_limit and share.max() < 0.05)
     same = tune(inertia, postures, asked, TuningOptions(0.05, 0.2, bandwidth=2.0), PERIOD)
     for law in ("ctc", "indi", "dob", "tde_tsmc"):
-        np.testing.assert_array_equal(same.gains[law]["k_p"], np.full(9, 4.0))
-    np.testing.assert_array_equal(same.gains["adrc"]["omega_c"], np.full(9, 2.0))
+        np.testing.assert_array_equal(same.laws[law].gains["k_p"], np.full(9, 4.0))
+    np.testing.assert_array_equal(same.laws["adrc"].gains["omega_c"], np.full(9, 2.0))
 
 
 @given(st.integers(0, 2**32 - 1), st.integers(2, 9))
@@ -152,15 +165,15 @@ def white(rate: float, angle: float = 0.0, ticks: int = 8000) -> Noise:
 
 def test_noise_is_kept_within_the_ripple_allowed() -> None:
     inertia, postures, asked = scene()
-    wishes = TuningOptions(0.05, 0.2, ripple=0.1)
+    options = TuningOptions(0.05, 0.2, ripple=0.1)
     quiet, loud = (
-        tune(inertia, postures, asked, wishes, PERIOD, noise=white(x)) for x in (1e-9, 1e-5)
+        tune(inertia, postures, asked, options, PERIOD, noise=white(x)) for x in (1e-9, 1e-5)
     )
-    assert quiet.corner_hz == tuned(wishes).corner_hz
+    assert quiet.corner_hz == tuned(options).corner_hz
     weight = 1.0 - np.exp(-2.0 * np.pi * loud.corner_hz * PERIOD)
-    share = loud.gains["tde_stc"]["h_bar"] * weight / PERIOD * 1e-5 / asked.peak
+    share = loud.laws["tde_stc"].gains["h_bar"] * weight / PERIOD * 1e-5 / asked.peak
     assert share.max() == pytest.approx(0.1, rel=0.05)
-    assert loud.bandwidth == pytest.approx(0.05 / loud.delay / 4.0, rel=1e-3)
+    assert loud.design.bandwidth == pytest.approx(0.05 / loud.design.delay / 4.0, rel=1e-3)
 
 
 def test_noise_beyond_any_low_pass_is_refused() -> None:
@@ -179,13 +192,13 @@ def test_axes_that_nothing_is_asked_of_have_gains_as_well() -> None:
     )
     found = tune(inertia, postures, planar, TuningOptions(0.05, 0.2), PERIOD)
     usual = tuned(TuningOptions(0.05, 0.2))
-    for law, gains in found.gains.items():
-        for name, values in gains.items():
+    for law, own in found.laws.items():
+        for name, values in own.gains.items():
             assert np.all(values > 0.0), (law, name)
             if name == "gamma":  # of the forces of all axes together
                 continue
             busy = np.delete(np.arange(len(values)), idle)
-            np.testing.assert_array_equal(values[busy], usual.gains[law][name][busy])
+            np.testing.assert_array_equal(values[busy], usual.laws[law].gains[name][busy])
 
 
 @functools.cache

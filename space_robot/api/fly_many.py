@@ -17,7 +17,7 @@ from ..flight.compilation import compile_kernels
 from ..flight.plan import Flight
 from ..scenario.scenario import Scenario
 from .flown_flight import FlownFlight
-from .in_process import fly_in_process
+from .flown_flight import fly_in_process
 
 
 def fly_many(
