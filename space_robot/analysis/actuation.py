@@ -11,12 +11,8 @@ from space_robot_msgs_py.errors import InputError
 
 from .analysed_log import AnalysedLog
 from .described import NO_LIMITS, torque_limits
-from .series import Definition
-from .series import Limit
-from .series import TimeSeries
-from .series import metrics
-from .series import series
 from .errors import measured_rows
+from .series import Definition, Limit, TimeSeries, metrics, series
 
 Array = NDArray[np.float64]
 

@@ -16,8 +16,7 @@ from ..flight.batch.compilation import compile_lanes
 from ..flight.compilation import compile_kernels
 from ..flight.plan import Flight
 from ..scenario.scenario import Scenario
-from .flown_flight import FlownFlight
-from .flown_flight import fly_in_process
+from .flown_flight import FlownFlight, fly_in_process
 
 
 def fly_many(

@@ -91,7 +91,7 @@ def export(
     from ..console.progress import counting_progress
     from ..console.terminal import echo_json
     from ..export.folder import check_folder, write_folder, write_readme
-    from ..export.software import export as exported_of
+    from ..export.software import export as export_software
     from ..export.software import recorded_flights
     from ..export.verify import verify
     from ..flight.compilation import compile_kernels

@@ -24,14 +24,8 @@ from ..flight.simulate import simulate
 from ..scenario.node_settings import FlightSettings
 from ..tuning.flexible import FlexibleMotions, check_flexible
 from ..tuning.gain_check import GainCheck, check_gains, estimated_with, pair_corner
-from ..tuning.inertia import SAMPLING
-from ..tuning.inertia import inertia_along
-from ..tuning.inertia import sampled_reference
-from ..tuning.spectrum import LEAST_MARGIN
-from ..tuning.inertia import postures_along
-from ..tuning.spectrum import COARSE
-from ..tuning.spectrum import check_masses
-from ..tuning.spectrum import drawn_inertias
+from ..tuning.inertia import SAMPLING, inertia_along, postures_along, sampled_reference
+from ..tuning.spectrum import COARSE, DRAWS, LEAST_MARGIN, check_masses, drawn_inertias
 
 Array = NDArray[np.float64]
 
@@ -194,7 +188,7 @@ def held_ripple(flight: Flight, plan: Scenario) -> Array | None:
 
 
 def _first_law(plan: Scenario) -> str:
-    settings = FlightSettings.resolve(plan.options(), plan.parameters).controller
+    settings = FlightSettings.resolve(plan).controller
     names = available_laws(settings)
     if not names:
         raise InputError(f"gains {settings.gains!r} have no file for any law of this project")

@@ -155,9 +155,9 @@ def _version(package: str) -> str | None:
 def check_flights() -> CheckedItem:
     """Import what flights in one process need, and resolve the default flight without flying it."""
     try:
-        from ..flight.plan import FlightPlan, resolve
+        from ..flight.plan import Scenario, resolve
 
-        plan = resolve(FlightPlan()).options
+        plan = resolve(Scenario()).options
     except Exception as error:  # whatever fails here would end a flight
         text = f"no flight can be prepared ({one_line_of(error)})"
         advice = "reinstall space_robot, with the versions of constraints.txt"

@@ -9,6 +9,7 @@ import numpy as np
 import yaml
 from numpy.typing import NDArray
 
+from space_robot.flight.flight_messages import MessageLoop
 from space_robot_control.controller.law_choice import LawChoice
 from space_robot_control.controller.tick import NEW
 from space_robot_control.flight_code.acceptance import (
@@ -27,8 +28,7 @@ from space_robot_msgs_py.config.validation import one_of
 from space_robot_msgs_py.errors import FlightError
 from space_robot_msgs_py.samples import RobotState
 
-from ..flight.message_loop import MessageLoop
-from ..flight.plan import Flight, FlightPlan, resolve
+from ..flight.plan import Flight, Scenario, resolve
 
 Array = NDArray[np.float64]
 
@@ -97,7 +97,7 @@ class RecordedFlight(NamedTuple):
 
 
 def recorded_flights(
-    plan: FlightPlan, exported: Exported, further: Sequence[str], seconds: float | None = None
+    plan: Scenario, exported: Exported, further: Sequence[str], seconds: float | None = None
 ) -> Iterator[RecordedFlight]:
     """Fly and record what exported flight software has to answer.
 
@@ -156,7 +156,7 @@ def _flown(
     return supervisor
 
 
-def _hostile(plan: FlightPlan, exported: Exported, laws: Sequence[str]) -> RecordingSupervisor:
+def _hostile(plan: Scenario, exported: Exported, laws: Sequence[str]) -> RecordingSupervisor:
     """Record the answers to hostile states and references, between noisy ones of a still base.
 
     The first reference is none, so that there is nothing to hold.

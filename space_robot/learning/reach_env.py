@@ -32,10 +32,10 @@ try:
 except ImportError:
     raise ImportError(f"gymnasium is not installed: {install_command('gym')}") from None
 
-from ..api.scenario import Scenario
+from space_robot.scenario.scenario import Scenario
+
 from ..flight.batch.lane_loop import InLanes
-from ..flight.batch.lane_memory import in_lanes
-from ..flight.batch.lane_memory import record_numbers
+from ..flight.batch.lane_memory import in_lanes, record_numbers
 from ..flight.compilation import compile_kernels
 from ..flight.plan import Flight
 from .reach import LARGEST, Reach, observe_start, step_alone, step_in_lanes

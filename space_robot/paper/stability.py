@@ -30,6 +30,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from space_robot.analysis.errors import neglected_force
 from space_robot_control.laws import laws
 from space_robot_model.dynamics.attitude import attitude_error_into
 from space_robot_model.dynamics.rho_space import RhoSpaceModel, rho_space_into
@@ -37,7 +38,6 @@ from space_robot_model.robot import Robot
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.errors import InputError
 
-from ..analysis.generalised_motion import neglected_force
 from ..flight.plan import NO_FRICTION, Flight, Scenario, resolve
 from ..tuning.spectrum import contraction_matrix
 from .lyapunov import Certificate, certify, largest_tolerated_beta, paper_m, peak_gain, residual

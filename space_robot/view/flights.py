@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from space_robot.analysis.page import template
 from space_robot_model.robot import Robot
 from space_robot_model.robot.find import find_robot, robot_as_path
 from space_robot_model.robot.parts import Spring
@@ -20,7 +21,6 @@ from space_robot_msgs_py.bag.law_history import as_data, in_words, laws_of
 from space_robot_msgs_py.errors import InputError
 
 from ..analysis.described import check_joints, robot_of
-from ..analysis.template import template
 from .actuators import ActuatorFrames, actuator_notes, described_actuators
 from .animation import ShownFlight, animate
 from .frames import RATE_HZ, shown_times

@@ -13,13 +13,8 @@ from matplotlib.figure import Figure
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.bag.law_history import as_data, laws_of
 
-from ..analysed_log import AnalysedLog
-from ..plotted import KINDS
-from ..plotted import quantities_of
-from ..analysed_log import PointingBudget
-from ..described import flown_actuators
-from ..external_torques import torques_by_source
-from ..momentum import momentum_of
+from ..analysed_log import AnalysedLog, PointingBudget
+from ..plotted import KINDS, quantities_of
 from ..words import flown
 from .base_torque import chatter, junctions
 from .flight_curves import FlightCurves

@@ -16,10 +16,7 @@ from space_robot_msgs_py.errors import InputError
 from ..analysed_log import AnalysedLog, PointingBudget
 from ..described import event_times
 from ..errors import AxisIndex, controls_base
-from ..plotted import PlottedQuantity
-from ..plotted import quantities_of
-from ..series import GROUPS
-from ..series import SeriesGroup
+from ..plotted import PlottedQuantity, quantities_of
 from ..torques import RippleSpectrum, ripple_spectrum
 from ..waypoints import junction_ticks
 

@@ -11,12 +11,12 @@ from matplotlib.gridspec import GridSpec
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
+from space_robot.analysis.errors import relative_rate
 from space_robot_msgs_py.bag.flight_log import FlightLog
 
 from ..analysed_log import AnalysedLog
 from ..described import event_times
 from ..errors import attitude_angles, tracking_error
-from ..generalised_motion import relative_rate
 from ..plotted import PlottedQuantity, quantities_of
 from ..waypoints import junction_ticks, waypoint_ticks
 from .style import (

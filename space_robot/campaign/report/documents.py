@@ -11,9 +11,10 @@ from typing import Any
 import yaml
 from rich.console import Console
 
+from space_robot.analysis.page import template
+
 from ...analysis.figures.figure_set import Drawing, SavedFigure
 from ...analysis.figures.style import save_figure
-from ...analysis.template import template
 from ...console.tables import as_markdown
 from ...console.terminal import say
 from ...console.terminal_tables import print_table

@@ -87,7 +87,7 @@ def test_memory_and_disk(tmp_path: Path) -> None:
 def test_kernels(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     folder = tmp_path / "cache"
     mark = folder / "complete"
-    monkeypatch.setattr("space_robot.flight.compilation.mark_of", lambda _: mark)
+    monkeypatch.setattr("space_robot.flight.compilation.mark_file", lambda _: mark)
     monkeypatch.setattr("space_robot_msgs_py.compiled.cache.cache_directory", lambda: folder)
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path / "temporary"))
     refused = check_kernels()

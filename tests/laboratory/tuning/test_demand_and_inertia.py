@@ -12,9 +12,7 @@ from scipy.spatial.transform import Rotation
 from strategies import State, random_quaternion, random_robot
 
 from space_robot.analysis.mission_plan import planned_segments
-from space_robot.flight.plan import Flight
-from space_robot.flight.plan import Scenario
-from space_robot.flight.plan import resolve
+from space_robot.flight.plan import Flight, Scenario, resolve
 from space_robot.tuning.inertia import (
     SAMPLING,
     free_inertia,

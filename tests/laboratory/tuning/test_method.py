@@ -11,16 +11,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from space_robot.flight.plan import Flight
-from space_robot.flight.plan import Scenario
-from space_robot.flight.plan import resolve
-from space_robot.tuning.inertia import SAMPLING
-from space_robot.tuning.inertia import inertia_along
-from space_robot.tuning.method import Tuned
-from space_robot.tuning.method import tune
-from space_robot.tuning.inertia import Posture
-from space_robot.tuning.inertia import postures_along
-from space_robot.tuning.method import LINEAR_SHARE
+from space_robot.flight.plan import Flight, Scenario, resolve
+from space_robot.tuning.inertia import SAMPLING, Posture, inertia_along, postures_along
+from space_robot.tuning.method import LINEAR_SHARE, Tuned, tune
 from space_robot.tuning.noise import Noise, listen
 from space_robot.tuning.ripple import linear_ripple, switching_ripple
 from space_robot.tuning.spectrum import eigenvalues

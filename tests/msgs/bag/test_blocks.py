@@ -10,10 +10,8 @@ import pytest
 
 from space_robot.analysis import analyze
 from space_robot.analysis.estimate_error import HBar, errors_of, recorded_h_bar
-from space_robot.flight.plan import Flight
-from space_robot.flight.plan import Scenario
-from space_robot.flight.plan import resolve
 from space_robot.analysis.load_bag import excerpt
+from space_robot.flight.plan import Flight, Scenario, resolve
 from space_robot.flight.replay.run import RecordedLaws
 from space_robot.flight.simulate import simulate
 from space_robot_msgs_py.bag.flight_log import REFERENCE, FlightLog
