@@ -15,9 +15,6 @@ from space_robot_msgs_py.config.text import html_table
 from space_robot_msgs_py.config.validation import StrictModel, one_line, one_of, short
 from space_robot_msgs_py.errors import InputError, explained_by
 
-from ..console.progress import check_progress
-from ..flight.compilation import compile_kernels
-from ..flight.plan import Flight, resolve
 from .options import OPTIONS, Options
 
 if TYPE_CHECKING:
@@ -138,7 +135,7 @@ class Scenario(StrictModel, Options):
         Raises:
             InputError: something does not exist, or does not fit the rest; in one line.
         """
-        from ..flight.plan import Flight
+        from ..flight.plan import Flight, resolve
 
         flight = Flight(resolve(self))
         flight.check_in_process()
@@ -178,7 +175,8 @@ class Scenario(StrictModel, Options):
         Raises:
             InputError: see `check`; or the bag cannot be created, or there is no room for a log.
         """
-        from space_robot.api.flown_flight import fly_with_progress
+        from ..api.flown_flight import fly_with_progress
+        from ..console.progress import check_progress
 
         if self.controller is None:
             raise InputError("controller is None, so there is nothing to fly: use bench()")
@@ -199,6 +197,7 @@ class Scenario(StrictModel, Options):
             InputError: see `check`.
         """
         from ..api.bench import Bench
+        from ..flight.compilation import compile_kernels
 
         flight = self.check()
         compile_kernels(bool(flight.plant.names.actuators))
