@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from space_robot_model.dynamics.attitude import attitude_error_into
-from space_robot_model.elementary.matrices import dot_rows, unit_rows
+from space_robot_model.elementary.matrices import dot_rows, norms, unit_rows
 from space_robot_model.robot.placements import base_axes, to_base
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.compiled.kernels import kernel
@@ -142,7 +142,7 @@ def quaternions_of(eps: Array) -> Array:
 def rotation_vectors(quaternions: Array) -> Array:
     """Compute the rotation vectors (N, 3), rad, of quaternions (N, 4) with eta >= 0."""
     vectors = quaternions[:, 1:]
-    sine = np.linalg.norm(vectors, axis=1)
+    sine = norms(vectors)
     angle, is_turned = 2.0 * np.arctan2(sine, quaternions[:, 0]), sine > 0.0
     rotations: Array = np.divide(angle, sine, out=np.full_like(sine, 2.0), where=is_turned)
     return rotations[:, np.newaxis] * vectors

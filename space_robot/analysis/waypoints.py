@@ -12,7 +12,7 @@ from space_robot_msgs_py.errors import InputError
 
 from .analysed_log import AnalysedLog
 from .errors import joined_error
-from .series import Definition, metrics
+from .series import Definition, largest_sizes, metrics
 
 Array = NDArray[np.float64]
 
@@ -80,7 +80,7 @@ def settling(flight: AnalysedLog) -> dict[str, float]:
     for start, stop in flight.blocks():
         error = joined_error(log.rows(start, stop), flight.attitude_errors(start, stop))
         for name, axes in flight.error_columns.items():
-            outside = np.abs(error[:, axes]).max(axis=1) > BAND
+            outside = largest_sizes(error[:, axes]) > BAND
             if outside.any():
                 row = start + len(outside) - 1 - int(np.argmax(outside[::-1]))
                 last[name] = max(last[name], row)
