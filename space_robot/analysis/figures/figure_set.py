@@ -104,37 +104,39 @@ class FigureSet:
 
     def drawings(self) -> dict[str, Drawing]:
         """Return the available figures by file name, without drawing them."""
-        flights = self._flights
+        flights, drawings = self._flights, dict[str, Drawing]()
         torques = {n: s.base_torque for n, s in flights.items() if s.base_torque is not None}
-        drawings: dict[str, Drawing] = {}
+
+        def add(stem: str, caption: str, draw: Callable[[], Figure]) -> None:
+            drawings[stem] = Drawing(caption, draw)
+
         several = len(self._missions) > 1
         for number, (name, figure) in enumerate(self._missions.values(), start=1):
             suffix, of = (f"_{number}", f" of {name}") if several else ("", "")
             caption = f"Desired joint angles{of} (Fig. 5)"
-            drawings[f"desired_joints{suffix}"] = Drawing(caption, partial(_drawn, figure))
+            add(f"desired_joints{suffix}", caption, partial(_drawn, figure))
         if len(flights) == 1 and self._first is not None:
             caption = "Errors and torques of base and joints (Figs. 6 to 9)"
-            drawings["control_results"] = Drawing(caption, partial(_drawn, self._first))
+            add("control_results", caption, partial(_drawn, self._first))
         else:
             caption = "Errors and torques, norms over each group of axes (Figs. 6 to 9)"
-            drawings["control_results"] = Drawing(caption, partial(errors_and_torques, flights))
+            add("control_results", caption, partial(errors_and_torques, flights))
         if torques:
-            caption = "Base torque x where two motions meet"
-            drawings["junctions"] = Drawing(caption, partial(junctions, torques))
+            add("junctions", "Base torque x where two motions meet", partial(junctions, torques))
             caption = "A stretch of base torque, and its spectrum"
-            drawings["chatter"] = Drawing(caption, partial(chatter, torques))
-        drawings["ripple"] = Drawing("Spectrum of the torques' ripple", partial(ripple, flights))
+            add("chatter", caption, partial(chatter, torques))
+        add("ripple", "Spectrum of the torques' ripple", partial(ripple, flights))
         for number, (name, figures) in enumerate(self._parts.items(), start=1):
             suffix, of = (f"_{number}", f" of {name}") if len(flights) > 1 else ("", "")
             for stem, (caption, figure) in figures.items():
-                drawings[f"{stem}{suffix}"] = Drawing(f"{caption}{of}", partial(_drawn, figure))
+                add(f"{stem}{suffix}", f"{caption}{of}", partial(_drawn, figure))
         if torques:
             caption = "The base's pointing error; dotted: the band"
-            drawings["base_pointing"] = Drawing(caption, partial(base_pointing, flights))
+            add("base_pointing", caption, partial(base_pointing, flights))
         caption = "The end effector's pointing error in the inertial frame"
-        drawings["pointing"] = Drawing(caption, partial(pointing, flights))
+        add("pointing", caption, partial(pointing, flights))
         caption = "Time from a state's sending to its command's"
-        drawings["latency"] = Drawing(caption, partial(latency_histogram, flights))
+        add("latency", caption, partial(latency_histogram, flights))
         return drawings
 
 

@@ -12,13 +12,11 @@ import warnings
 from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
-from typing import IO, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import matplotlib.style
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure, FigureBase
 from matplotlib.legend import Legend
 from matplotlib.lines import Line2D
@@ -256,21 +254,10 @@ def save_figure(figure: Figure, stem: Path, *, png: bool = True) -> tuple[Path, 
             engine.execute(figure)
             figure.set_layout_engine("none")  # avoids a new layout for each file
         files = []
+        metadata = {"png": {"Software": None}, "svg": {"Date": None, "Creator": None}}
         for format in ("png", "svg") if png else ("svg",):
             path = stem.with_name(f"{stem.name}.{format}")
             with atomic_file(path, replace=True) as file:
-                _print(figure, file, format)
+                figure.savefig(file, format=format, dpi=RESOLUTION, metadata=metadata[format])
             files.append(path)
     return tuple(files)
-
-
-def _print(figure: Figure, file: IO[Any], format: str) -> None:
-    """Write a figure as `Figure.savefig` does, but without drawing it twice."""
-    canvas: Any  # untyped
-    if format == "png":
-        figure.dpi = RESOLUTION  # writing an SVG changes it
-        canvas = FigureCanvasAgg(figure)
-        canvas.print_png(file, metadata={"Software": None})
-    else:
-        canvas = FigureCanvasSVG(figure)
-        canvas.print_svg(file, metadata={"Date": None, "Creator": None})
