@@ -88,8 +88,8 @@ def graph(run: Run) -> Iterator[Row]:
 def _timed_command(folder: Path) -> Any:
     """Return what `orchestrator.fly` asks for a node's command: plant and controller are timed."""
 
-    def command(node: str, parameters: Mapping[str, Any], namespace: str = topics.ROOT) -> Command:
-        arguments = ros_arguments(parameters, namespace)
+    def command(node: str, parameters: Mapping[str, Any], namespace: str, scratch: Path) -> Command:
+        arguments = ros_arguments({node: parameters}, namespace, scratch / f"{node}.yaml")
         if node not in PARTS:
             return Program(MODULES[node], arguments)
         return Program("graph_nodes", [node, str(folder / f"{node}.npz"), *arguments])

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Collection, Mapping, Sequence
 from functools import partial
+from pathlib import Path
 from typing import Any, NamedTuple
 
 from space_robot_msgs_py.errors import FlightError
@@ -78,13 +79,14 @@ def follow(
     flight: Flight,
     parameters: dict[str, dict[str, Any]],
     domain: int,
+    folder: Path,
     stopped: list[int],
     is_empty: bool = False,
 ) -> dict[str, Any]:
     """Fly on started nodes until the plant ends the flight; return a report."""
     monitor = Monitor(domain, flight.scenario.options.namespace, period=flight.period)
     try:
-        follower = _Follower(graph, flight, parameters, monitor, stopped)
+        follower = _Follower(graph, flight, parameters, monitor, folder, stopped)
         with flight_progress(follower.total_s, flight.controller_name) as show:
             follower.bring_up(show, is_empty)
             follower.until_complete(show)
@@ -100,6 +102,7 @@ class _Follower:
         flight: Flight,
         parameters: dict[str, dict[str, Any]],
         monitor: Monitor,
+        folder: Path,
         stopped: list[int],
     ) -> None:
         slides = flight.robot.is_prismatic[: flight.robot.n]
@@ -120,9 +123,7 @@ class _Follower:
             monitor,
             planned=frozenset(NODE_OF[fault.kind] for fault in flight.scenario.process_faults),
             restart_command=(
-                partial(
-                    _restart_command, parameters["controller"], flight.scenario.options.namespace
-                )
+                partial(_restart_command, parameters["controller"], options.namespace, folder)
                 if flight.scenario.options.restart_controller
                 else None
             ),
@@ -236,7 +237,7 @@ def _remark(
 
 
 def _restart_command(
-    parameters: Mapping[str, Any], namespace: str, absent: Collection[str]
+    parameters: Mapping[str, Any], namespace: str, folder: Path, absent: Collection[str]
 ) -> Command:
     """Return the command to restart a controller while some nodes are ``absent``.
 
@@ -245,4 +246,4 @@ def _restart_command(
     """
     listeners = wait_for("controller", absent)
     again = {"wait_for": listeners, "listener_timeout": LISTENER_TIMEOUT_S}
-    return node_command("controller", {**parameters, **again}, namespace)
+    return node_command("controller", {**parameters, **again}, namespace, folder)

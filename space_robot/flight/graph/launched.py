@@ -9,9 +9,9 @@ from typing import Any
 from ..bag_path import check_bag_path
 from ..compilation import compile_kernels
 from ..plan import Flight
-from .composed import write_parameters
 from .node_names import NODE_NAMES, PLANT
 from .orchestrator import flight_parameters, with_files
+from .processes import write_parameters
 
 
 def launched_parameters(
@@ -39,7 +39,7 @@ def launched_parameters(
         node: {**values, "autostart": autostart, **of_ros.get(node, {})}
         for node, values in parameters.items()
     }
-    return write_parameters(started, folder)
+    return write_parameters(started, folder / "parameters.yaml")
 
 
 class LaunchedGraph:

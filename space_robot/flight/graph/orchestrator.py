@@ -29,19 +29,18 @@ from ..bag_path import check_bag_path
 from ..compilation import compile_kernels
 from ..flight_messages import bag_remark
 from ..plan import Flight
-from .composed import NAME, composed_command, write_parameters
+from . import composed
+from .composed import NAME
 from .domain import is_quiet, ros_domain
 from .following import follow
 from .monitor import MONITOR
 from .node_names import reset_with, wait_for
 from .node_server import Program
 from .node_services import own_name
-from .processes import Command, Graph, node_command, node_environment
+from .processes import Command, Graph, node_command, node_environment, ros_arguments
 
 COMPOSED_DRAIN_S = 0.002
 """Period of the recorder in one process with the other nodes, which wait while it writes."""
-LONGEST_ARGUMENT = 100_000
-"""Characters of an argument of a command line; Linux takes 131071 bytes."""
 
 
 def fly(
@@ -82,7 +81,9 @@ def fly(
                 parameters = with_files(parameters, flight, folder)
                 commands = _commands(flight, parameters, folder)
                 with Graph(commands, node_environment(domain)) as graph:
-                    what_happened = follow(graph, flight, parameters, domain, stopped, is_empty)
+                    what_happened = follow(
+                        graph, flight, parameters, domain, folder, stopped, is_empty
+                    )
         except BaseException as error:
             if not _has_states(bag, namespace):
                 shutil.rmtree(bag, ignore_errors=True)
@@ -110,21 +111,9 @@ def _commands(
     }
     namespace = options.namespace
     if options.composed:
-        return {NAME: composed_command(started, namespace, folder)}
-    return {node: _command(node, values, namespace, folder) for node, values in started.items()}
-
-
-def _command(node: str, values: Mapping[str, Any], namespace: str, folder: Path) -> Command:
-    """Return the command of a node; parameters that no command line can hold are in a file."""
-    command = node_command(node, values, namespace)
-    if isinstance(command, Program) or max(map(len, command)) <= LONGEST_ARGUMENT:
-        return command
-    own = folder / node
-    own.mkdir()
-    file = write_parameters({node: values}, own)
-    command = node_command(node, {}, namespace)
-    assert not isinstance(command, Program)
-    return [*command, "--ros-args", "--params-file", str(file)]
+        file = folder / "parameters.yaml"
+        return {NAME: Program(composed.__name__, ros_arguments(started, namespace, file))}
+    return {n: node_command(n, values, namespace, folder) for n, values in started.items()}
 
 
 def _claim(bag: Path) -> None:

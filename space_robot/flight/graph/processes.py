@@ -53,21 +53,36 @@ def node_environment(domain: int) -> dict[str, str]:
     return {**defaults(), **clean_environment(), **lifeline(), "ROS_DOMAIN_ID": str(domain)}
 
 
-def node_command(node: str, parameters: Mapping[str, Any], namespace: str = ROOT) -> Command:
-    """Return the command of a node: ``ros2 run`` where it is available, else Python."""
-    arguments = ros_arguments(parameters, namespace)
+def node_command(node: str, parameters: Mapping[str, Any], namespace: str, folder: Path) -> Command:
+    """Return the command of a node: ``ros2 run`` where it is available, else Python.
+
+    Its parameters are written to ``folder``.
+    """
+    arguments = ros_arguments({node: parameters}, namespace, folder / f"{node}_parameters.yaml")
     if has_ros2_run():
         return ["ros2", "run", PACKAGE, f"{node}_node", *arguments]
     return Program(MODULES[node], arguments)
 
 
-def ros_arguments(parameters: Mapping[str, Any], namespace: str = ROOT) -> list[str]:
-    """Return parameters and namespace as ROS command-line arguments."""
-    arguments = [] if namespace == ROOT else ["-r", f"__ns:={namespace}"]
-    for name, value in parameters.items():
-        # JSON is YAML, which ROS reads
-        arguments += ["-p", f"{name}:={json.dumps(value)}"]
-    return ["--ros-args", *arguments] if arguments else []
+def ros_arguments(
+    parameters: Mapping[str, Mapping[str, Any]], namespace: str, file: Path
+) -> list[str]:
+    """Return ROS command-line arguments for a namespace and the parameters of nodes, in a file.
+
+    A command line holds no long ones, and ROS takes those on it for the root namespace's nodes.
+    """
+    write_parameters(parameters, file)
+    remapping = [] if namespace == ROOT else ["-r", f"__ns:={namespace}"]
+    return ["--ros-args", *remapping, "--params-file", str(file)]
+
+
+def write_parameters(parameters: Mapping[str, Mapping[str, Any]], file: Path) -> Path:
+    """Write a ROS parameter file of nodes; return its path."""
+    content = {
+        f"/**/{node}_node": {"ros__parameters": values} for node, values in parameters.items()
+    }
+    file.write_text(json.dumps(content), encoding="utf-8")  # JSON is YAML, which ROS reads
+    return file
 
 
 class SpawnedProcess(subprocess.Popen[bytes]):

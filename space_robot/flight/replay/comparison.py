@@ -133,11 +133,6 @@ class Stretch(NamedTuple):
     equal: int
     """Ticks whose commands are equal to the last bit."""
 
-    @property
-    def is_equal(self) -> bool:
-        """True if all are."""
-        return self.equal == self.last - self.first + 1
-
 
 class Comparison:
     """Commands of the ticks that were played."""

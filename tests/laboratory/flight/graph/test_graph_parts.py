@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import signal
 import sys
@@ -17,7 +16,6 @@ from typing import IO, Any
 import psutil
 import pytest
 
-from space_robot.flight.graph import orchestrator, processes
 from space_robot.flight.graph.following import degradation
 from space_robot.flight.graph.launched import LaunchedGraph
 from space_robot.flight.graph.node_names import NODE_NAMES
@@ -122,22 +120,6 @@ def test_an_error_is_told_though_much_was_said_after_it() -> None:
         process.close()
     assert first == "plant_node: error: the flight diverged"
     assert rest == [f"word {k}" for k in range(TAIL_LINES, 2 * TAIL_LINES)]
-
-
-def test_a_parameter_that_no_command_line_can_hold_is_in_a_file(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(processes, "has_ros2_run", lambda: True)
-    for length in (10, 200_000):
-        values = {"disturbance.table": "1" * length, "period": 0.0005}
-        command = orchestrator._command("plant", values, "/sat1", tmp_path)
-        assert not isinstance(command, processes.Program)
-        assert command[:4] == ["ros2", "run", "space_robot", "plant_node"]
-        assert "__ns:=/sat1" in command
-        assert ("period:=0.0005" in command) == (length == 10)
-    assert max(map(len, command)) < 1_000
-    file = Path(command[command.index("--params-file") + 1])
-    assert json.loads(file.read_text()) == {"/**/plant_node": {"ros__parameters": values}}
 
 
 # Services are called once, when the answer will arrive
