@@ -6,13 +6,16 @@ import json
 import math
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from ...console.tables import Column, Group, JudgedCell, Table
 from ..verdicts.laws import Estimate, League
 from ..verdicts.requirements import Verdict
-from ..verdicts.rows import GridPoint
+from ..verdicts.rows import GridPoint, law_rows
 from .findings import CONFIDENCE, WORST, Findings, Quantity
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
 
 TONES = {
     **{"met": "good", "not met": "bad", "undecided": "open", "not measured": "open"},
@@ -453,25 +456,29 @@ def _index(estimate: Estimate) -> tuple[str, str]:
 def worst_table(findings: Findings, point: GridPoint, quantity: Quantity, law: str = "") -> Table:
     """Tabulate the worst runs, with the command that flies the first of them again."""
     worst = findings.worst(point, quantity, law=law)
-    values = [_value(row, quantity) for row in worst.to_dict("records")]
-    runs, laws = worst["run"].tolist(), worst["law"].tolist()
+    values, runs, laws = _values(worst, quantity), worst["run"].tolist(), worst["law"].tolist()
     notes = [f"{findings.rerun_command(runs[0], laws[0])}    # the first of them"]
     if len(set(values)) == 1 and len(values) == WORST:
-        rows = point.table[point.table["law"] == law] if law else point.table
-        same = sum(_value(row, quantity) == values[0] for row in rows.to_dict("records"))
-        notes.insert(
-            0,
-            f"All {WORST} are equal, as {same:,} of {len(rows):,} flights are: {values[0]}; none "
-            "of them is worse than the others.",
-        )
+        rows = law_rows(point.table, law) if law else point.table
+        same = _values(rows, quantity).count(values[0])
+        equal = f"All {WORST} are equal, as {same:,} of {len(rows):,} flights are: {values[0]}"
+        notes.insert(0, f"{equal}; none of them is worse than the others.")
     title = f"Worst runs by {_titled(quantity.label, point.point, findings.names.get(law, ''))}"
     texts = [list(map(str, row)) for row in zip(runs, laws, values, strict=True)]
     columns = [Column("run"), Column("law", is_label=True), Column("value")]
     return Table(title, columns, [Group(texts)], notes)
 
 
-def _value(row: dict[Any, Any], quantity: Quantity) -> str:
-    if row["outcome"] == "complete":
-        return number(float(row[quantity.column]), ".4g")
-    end = f" at {row['ended_at_s']:.3g} s" if row["ended_at_s"] >= 0.0 else ""
-    return f"{row['outcome']}{end}"
+def _values(rows: DataFrame, quantity: Quantity) -> list[str]:
+    """Return the value of each flight; of an incomplete one its outcome, and when it ended."""
+    columns = rows[["outcome", "ended_at_s", quantity.column]].astype(
+        {"ended_at_s": float, quantity.column: float}
+    )
+    return [
+        number(value, ".4g")
+        if outcome == "complete"
+        else f"{outcome} at {end:.3g} s"
+        if end >= 0.0
+        else outcome
+        for outcome, end, value in columns.itertuples(index=False, name=None)
+    ]

@@ -117,8 +117,8 @@ def verdict(
     failures = int(np.sum(~(badness < sign * demand.bound) & ~is_unmeasured))
     word: Word = "not measured" if not_measured else "undecided"
     limits, bound, needed, projected = Interval(0.0, 1.0), None, None, None
-    if kind is not None and runs:
-        test = kind(demand.share, demand.confidence)
+    test = kind(demand.share, demand.confidence) if kind else None
+    if test and runs:
         if test.is_met(failures + not_measured, runs):
             word = "met"
         elif test.is_missed(failures, runs):
@@ -127,12 +127,11 @@ def verdict(
         limits = Interval(low.low, high.high)
         rank = test.bound_rank(runs)
         bound = None if rank is None else sign * float(np.sort(badness)[rank - 1])
-    if kind is Sequential:
-        sequential = Sequential(demand.share, demand.confidence)
-        total = sequential.runs_needed(failures + not_measured)
+    if isinstance(test, Sequential):
+        total = test.runs_needed(failures + not_measured)
         needed = None if total is None else max(0, total - runs)
         if runs and word == "undecided":
-            projected = projected_decision(sequential, failures, runs)
+            projected = projected_decision(test, failures, runs)
     return Verdict(
         name,
         law,

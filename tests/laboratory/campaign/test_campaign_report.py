@@ -83,8 +83,7 @@ def test_every_command_flies_a_row_of_the_campaign() -> None:
     findings = found(made_table(50))
     words = shlex.split(record(findings)["worst"][0]["command"])
     assert words[:4] == ["space-robot", "campaign", "rerun", "campaigns/a b"]
-    assert "--bag" in words
-    assert "--trust" not in words
+    assert ("--bag" in words, "--trust" in words) == (True, False)
     assert findings.rerun_command(8, "ctc").startswith("space-robot campaign rerun 'campaigns/a b'")
     named = shlex.split(findings.rerun_command(3, "ctc=/my gains/x"))
     assert named[-1] == "flights/3_ctc__my gains_x"
@@ -130,9 +129,7 @@ def test_the_table_says_how_often_verdicts_are_false(fixed: bool) -> None:
     """Three laws at 90 %: 0.3 in all; who may look at any time has a column more."""
     findings = found(made_table(60, bands=False), fixed_runs=fixed)
     table = verdict_table(findings, findings.required[0])
-    assert (
-        findings.family_error == record(findings)["any_verdict_false_at_most"] == pytest.approx(0.3)
-    )
+    assert record(findings)["any_verdict_false_at_most"] == pytest.approx(0.3)
     assert "any of these 3 with at most 0.3" in printed(findings)
     columns = [column.name for column in table.columns]
     assert ("more runs" in columns) != fixed
