@@ -86,7 +86,6 @@ def test_what_is_no_option(option: str) -> None:
     [
         ({"controler": "ctc"}, "unknown option 'controler' of Scenario: did you mean controller"),
         ({"realtime": True}, "realtime: that needs the graph of nodes: use `fly`"),
-        ({"namespace": "sat1"}, "namespace: that needs the graph of nodes"),
         ({"duration": -1.0}, "Scenario: duration: Input should be greater than 0, got -1.0"),
         ({"robot": 3.5j}, "robot: a name, a path or a Robot (an object or a mapping) was expected"),
         ({"controller": int}, "Scenario: controller: a name, a path or a ControlLaw (class or"),
