@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import json
 import shlex
 from pathlib import Path
 from typing import Any
 
 import click
-from click.core import ParameterSource
 
 from .completed_names import names_in
 from .numbers import FiniteRange
@@ -16,6 +14,7 @@ from .options import flight_options
 
 SECTION = "Gains and studies"
 
+WORDS = f"{__name__}.words"
 MASS_UNCERTAINTY = click.option(
     "--mass-uncertainty",
     type=FiniteRange(0.0, 0.9),
@@ -79,7 +78,16 @@ def check(as_json: bool, mass_uncertainty: float, **options: Any) -> None:
         raise SpaceRobotError("; ".join(checks.faults))
 
 
-@gains.command()
+class TypedCommand(click.Command):
+    """A command that keeps the words with which it was started."""
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        """Parse the words after the command's name."""
+        ctx.meta[WORDS] = tuple(args)
+        return super().parse_args(ctx, args)
+
+
+@gains.command(cls=TypedCommand)
 @flight_options("robot", "mission", "orbit", "sensors", "navigation", "period", "set")
 @click.option(
     "--case",
@@ -156,29 +164,11 @@ def tune(context: click.Context, /, output: Path, **options: Any) -> None:
     from ..tuning.task import TuningOptions
 
     names = ("margin", "mass_uncertainty", "bandwidth", "ripple", "h_bar", "noise_ripple")
-    targets, cases = (TuningOptions(*(options.pop(name) for name in names)), options.pop("cases"))
+    wanted, cases = TuningOptions(*(options.pop(name) for name in names)), options.pop("cases")
+    command = shlex.join(["space-robot", "gains", "tune", *context.meta[WORDS]])
     with terminal(stderr=True).status("tuning") as status:
-        tuned = tuned_set(options, cases, targets, status.update)
-    for path in write_set(tuned, _command(context), output):
+        tuned = tuned_set(options, cases, wanted, status.update)
+    for path in write_set(tuned, command, output):
         click.echo(f"wrote {path}", err=True)
     if remark := estimate_remark(tuned):
         click.echo(remark, err=True)
-
-
-def _command(context: click.Context) -> str:
-    """Return the command line with the options that the user set."""
-    words = []
-    for option in context.command.params:
-        name = str(option.name)
-        if context.get_parameter_source(name) == ParameterSource.DEFAULT:
-            continue
-        value = context.params[name]
-        if getattr(option, "is_flag", False):
-            words.append(option.opts[0])
-            continue
-        if name == "parameters":
-            parameters = [(f"{n}.{key}", v) for n, own in value.items() for key, v in own.items()]
-            value = [f"{parameter}={json.dumps(v)}" for parameter, v in parameters]
-        for each in value if isinstance(value, (list, tuple)) else [value]:
-            words += [option.opts[0], str(each)]
-    return shlex.join(["space-robot", "gains", "tune", *words])
