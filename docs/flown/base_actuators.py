@@ -56,7 +56,7 @@ def _asked(label: str, options: Options) -> list[str | Number | Text]:
     return [
         label,
         Text("{}, {}, {}", tuple(Number(options, peak, ".2f") for peak in PEAKS)),
-        Number(options, "sizing.peak_momentum_n_m_s", ".1f"),
+        Number(options, "sizing.peak_momentum", ".1f"),
     ]
 
 
@@ -95,7 +95,7 @@ PAGE = Page(
         ),
         Sentence(
             "The mission needs {} N m about a base axis and {} N m s of momentum.",
-            (Number(IDEAL, PEAKS[1], ".1f"), Number(IDEAL, "sizing.peak_momentum_n_m_s", ".1f")),
+            (Number(IDEAL, PEAKS[1], ".1f"), Number(IDEAL, "sizing.peak_momentum", ".1f")),
         ),
         Sentence(
             "flies each leg in 50 s with {} N m of the most loaded wheel, and an attitude error "

@@ -18,7 +18,7 @@ ATTITUDE = "attitude.rms"
 JOINTS_1_3 = "joints_1_3.rms"
 LAWS = ("ctc", "ctc_smc", "tde_smc", "tde_tsmc", "tde_stc")
 DRIFT, DEGREES = "attitude_drift.end", 180.0 / np.pi
-PEAKS = tuple(f"sizing.axes.base_{axis}.peak_torque_n_m" for axis in "xyz")
+PEAKS = tuple(f"sizing.base_{axis}.peak_torque" for axis in "xyz")
 
 
 def largest_wheel_torque(flown: FlownFlight) -> float:

@@ -33,7 +33,7 @@ def _nominal(mission: str) -> list[str | Number | Text]:
         Number(free, LARGEST, ".3g", DEGREES),
         Number(orbit, LARGEST, ".3g", DEGREES),
         Number(held, largest_base_torque, ".3g"),
-        Number(held, "sizing.peak_momentum_n_m_s", ".3g"),
+        Number(held, "sizing.peak_momentum", ".3g"),
     ]
 
 

@@ -10,7 +10,7 @@ from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.errors import InputError
 
 from .analysed_log import AnalysedLog
-from .described import NO_LIMITS, torque_limits
+from .described import NO_LIMITS
 from .errors import measured_rows
 from .series import Definition, Limit, TimeSeries, metrics, series
 
@@ -37,7 +37,7 @@ PERCENTILES = {"p50": 50.0, "p99": 99.0, "max": 100.0}
         "torque_limits.base": Definition("N m", "limit of the base's torque; missing: none"),
         "torque_limits.joints": Definition("N m", "limit of the joints' torques; missing: none"),
     },
-    applies=lambda flight: bool(np.isfinite(torque_limits(flight.log)).any()),
+    applies=lambda flight: bool(np.isfinite(flight.torque_limits).any()),
 )
 def saturation(flight: AnalysedLog) -> dict[str, float]:
     """Count the ticks at which the torque applied on some axis was at its limit.
@@ -45,7 +45,7 @@ def saturation(flight: AnalysedLog) -> dict[str, float]:
     The plant clips to the limit, so "at" is exact but for the rounding of whoever recorded. It is
     the torque as reported, behind the limits and before what the drives make of it.
     """
-    limits, log = torque_limits(flight.log), flight.log.as_measured()
+    limits, log = flight.torque_limits, flight.log.as_measured()
     ticks, limit = 0, limits.of_axes(log.axes) * (1.0 - ROUNDING)
     for start, stop in flight.blocks():
         at_limit = np.abs(log.applied_torque[start:stop]) >= limit
@@ -232,7 +232,7 @@ def commands(flight: AnalysedLog) -> dict[str, float]:
     if log.commanded_torque is None or not np.isfinite(log.commanded_torque[:, 0]).any():
         raise InputError("the commands were not recorded")
     try:
-        limits = torque_limits(log)
+        limits = flight.torque_limits
     except InputError:
         limits = NO_LIMITS
     axes = slice(3 if log.flight.get("base_actuators") else 0, None)

@@ -176,6 +176,15 @@ class AnalysedLog:
         """
         return described.flown_actuators(self.log)
 
+    @cached_property
+    def torque_limits(self) -> described.TorqueLimits:
+        """The limits that the plant clipped the torques to.
+
+        Raises:
+            InputError: see `described.torque_limits`.
+        """
+        return described.torque_limits(self.log)
+
     def parts(self, place: str) -> list[str]:
         """Return the names that a place in a metric's name stands for, see `series.expand`."""
         log = self.log

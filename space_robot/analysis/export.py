@@ -144,18 +144,21 @@ def _columns(log: FlightLog) -> Iterator[tuple[list[str], Array]]:
         (joints, lengths, log.joint_positions, log.joint_velocities),
         (log.passive_names, lengths[len(joints) :], log.passive_positions, log.passive_velocities),
     ):
-        yield _of_joints("{}_position", names, slides), positions
-        yield _of_joints("{}_velocity", names, slides, "_s"), velocities
+        yield _joint_columns("{}_position", names, slides), positions
+        yield _joint_columns("{}_velocity", names, slides, "_s"), velocities
     yield _with_units("applied_torque", axes, torques), log.applied_torque
     if (measured := log.measured) is not None:
         yield _each("measured_q", WXYZ), measured.quaternion
         yield _each("measured_omega_base", XYZ, "rad_s"), measured.omega_base
-        yield _of_joints("measured_position_{}", joints, lengths), measured.joint_positions
-        yield _of_joints("measured_velocity_{}", joints, lengths, "_s"), measured.joint_velocities
+        yield _joint_columns("measured_position_{}", joints, lengths), measured.joint_positions
+        yield (
+            _joint_columns("measured_velocity_{}", joints, lengths, "_s"),
+            measured.joint_velocities,
+        )
         yield _with_units("reported_torque", axes, torques), measured.applied_torque
     if log.assumed_error is not None:
         yield _each("assumed_error_q", XYZ), log.assumed_error[:, :3]
-        yield _of_joints("assumed_error_{}", joints, lengths), log.assumed_error[:, 3:]
+        yield _joint_columns("assumed_error_{}", joints, lengths), log.assumed_error[:, 3:]
     if log.commanded_torque is not None:
         yield _with_units("commanded_torque", axes, torques), log.commanded_torque
     wheels, thrusters = log.wheel_velocities.shape[1], log.thrusts.shape[1]
@@ -163,13 +166,13 @@ def _columns(log: FlightLog) -> Iterator[tuple[list[str], Array]]:
     yield _numbered("wheel_velocity", wheels, "rad_s"), log.wheel_velocities
     yield _numbered("wheel_torque", wheels, "n_m"), log.wheel_torques
     yield _numbered("thrust", thrusters, "n"), log.thrusts
-    asked = [
+    commanded = [
         *_numbered("commanded_wheel_torque", wheels, "n_m"),
         *_numbered("commanded_thrust", thrusters, "n"),
         *_numbered("commanded_dipole", torquers, "a_m2"),
     ]
-    if len(asked) == log.actuator_commands.shape[1]:
-        yield asked, log.actuator_commands
+    if len(commanded) == log.actuator_commands.shape[1]:
+        yield commanded, log.actuator_commands
     if log.latency_s is not None:
         yield ["latency_s"], log.latency_s[:, np.newaxis]
     yield _each("reference_q", WXYZ), q_d[:, :4]
@@ -178,11 +181,11 @@ def _columns(log: FlightLog) -> Iterator[tuple[list[str], Array]]:
     for k, (number, per) in enumerate(
         (("position", ""), ("velocity", "_s"), ("acceleration", "_s2"))
     ):
-        yield _of_joints(f"reference_{{}}_{number}", joints, lengths, per), joints_d[:, k]
+        yield _joint_columns(f"reference_{{}}_{number}", joints, lengths, per), joints_d[:, k]
     if controls_base(log):
         yield _each("error_q", XYZ), error[:, :3]
         yield _each("error_base", XYZ, "deg"), attitude_angles(log)
-    yield _of_joints("error_{}", joints, lengths), error[:, 3:]
+    yield _joint_columns("error_{}", joints, lengths), error[:, 3:]
     for name, declared in signals_of(StateSignals).items():
         values = getattr(log, name)
         if name not in NAMED_ABOVE and values.shape[1]:
@@ -199,7 +202,7 @@ def _further(name: str, declared: Signal, log: FlightLog, unit: str) -> list[str
     return _each("", declared.labels, unit)
 
 
-def _of_joints(
+def _joint_columns(
     what: str, joints: Sequence[str], slides: Sequence[bool], per: str = ""
 ) -> list[str]:
     """Return a name a joint, with its unit: rad, or m of one that slides, ``per`` a time."""

@@ -96,15 +96,15 @@ def planned_segments(
     return [_planned(asked, nominal) for asked in demands]
 
 
-def _planned(of_piece: PieceDemand, robot: Robot) -> PlannedSegment:
-    asked = of_piece.asked
+def _planned(piece_demand: PieceDemand, robot: Robot) -> PlannedSegment:
+    asked = piece_demand.asked
     rows = np.unique(np.linspace(0, len(asked.time) - 1, POSTURES).astype(int))
     tools = [tool_state(robot, asked.base[k, :4], asked.joints[k, 0]) for k in rows]
     smallest = [
         min(_smallest(tool.held, tool.position + tool.centre_of_mass) for tool in tools),
         min(_smallest(tool.free, tool.position + tool.centre_of_mass) for tool in tools),
     ]
-    return PlannedSegment(*of_piece, np.array([tool.position for tool in tools]), *smallest)
+    return PlannedSegment(*piece_demand, np.array([tool.position for tool in tools]), *smallest)
 
 
 def _smallest(jacobian: Array, lever: Array) -> float:
@@ -269,7 +269,7 @@ def stretched_mission(
         span = segment["duration_s"] * (factor if factor == 1.0 else factor * BETWEEN_SAMPLES)
         spans.append(span if factor == 1.0 else float(np.ceil(span * 10**DIGITS) / 10**DIGITS))
     pairs = zip(settings.written_segments, spans, strict=True)
-    return settings.model_copy(update={"segments": [_of_duration(*pair) for pair in pairs]})
+    return settings.model_copy(update={"segments": [_with_duration(*pair) for pair in pairs]})
 
 
 def lightened_mission(
@@ -310,7 +310,7 @@ def _lightened(
     return {**content, "bends_deg": bends} if share < WORTHWHILE else content
 
 
-def _of_duration(text: str, span: float) -> str:
+def _with_duration(text: str, span: float) -> str:
     content = parse_yaml(text)
     (segment,) = read_segments([text])
     if not isinstance(segment, HoldSegment):

@@ -59,7 +59,7 @@ class OwnMetric(NamedTuple):
             MetricError: the function raised an error, or returned no finite number.
             InputError: the function cannot be imported.
         """
-        return finite(self.value(log), f"metric {self.name}")
+        return finite_value(function_of(self.text), log, f"metric {self.name}")
 
 
 def call(function: MetricFunction, log: FlightLog, what: str) -> float:
@@ -87,18 +87,7 @@ def call(function: MetricFunction, log: FlightLog, what: str) -> float:
     raise MetricError(f"{what}: the function must return one number, got {got}")
 
 
-def finite(value: float, what: str) -> float:
-    """Return a finite number.
-
-    Raises:
-        MetricError: it is not finite.
-    """
-    if not math.isfinite(value):
-        raise MetricError(f"{what}: the function must return a finite number, got {value}")
-    return value
-
-
-def finite_value(function: MetricFunction | str, log: FlightLog) -> float:
+def finite_value(function: MetricFunction | str, log: FlightLog, what: str = "") -> float:
     """Return the metric of a flight, by a function or its name.
 
     Raises:
@@ -108,8 +97,10 @@ def finite_value(function: MetricFunction | str, log: FlightLog) -> float:
         return OwnMetric(name_of(function), function).finite_value(log)
     if not callable(function):
         raise InputError(f"a function or file.py:FUNCTION was expected, got {short(function)}")
-    what = f"metric {getattr(function, '__name__', type(function).__name__)}"
-    return finite(call(function, log, what), what)
+    what = what or f"metric {getattr(function, '__name__', type(function).__name__)}"
+    if not math.isfinite(value := call(function, log, what)):
+        raise MetricError(f"{what}: the function must return a finite number, got {value}")
+    return value
 
 
 def function_of(text: str) -> MetricFunction:

@@ -13,7 +13,7 @@ from .analysed_log import AnalysedLog, PointingBudget, pointed_axis, pointing_of
 from .described import actuators_of, event_labels, navigation_of, sensors_of, start_step_of
 from .errors import UNAVAILABLE
 from .measure import evaluate
-from .sizing import ActuatorSet, requirements
+from .sizing import ActuatorSet, load_requirements
 
 DESCRIBED = ("controller", "case", "gains", "robot")
 """Keys of a flight's description that a report repeats."""
@@ -89,7 +89,7 @@ def _sizing(
 ) -> dict[str, Any]:
     """Judge whether the parts of actuators have what is asked of them; without parts: nothing."""
     name, settings = other or ActuatorSet(actuators_of(flight.log), flight.actuators)
-    judged = [requirement.as_data() for requirement in requirements(settings, numbers)]
+    judged = [requirement.as_data() for requirement in load_requirements(settings, numbers)]
     return {"actuators": name, "flown": other is None, "requirements": judged}
 
 

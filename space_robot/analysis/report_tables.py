@@ -33,7 +33,7 @@ def rms_table(report: Report) -> Table:
     if report["truth_recorded"]:
         title += f"\n{seen_through(report)}"
     names = table_v_columns(metrics)
-    beside = {name: metrics[f"{name}.rms_eq64"] for name in names}
+    by_eq64 = {name: metrics[f"{name}.rms_eq64"] for name in names}
     seen = {name: metrics.get(f"navigation_{name}.rms", "") for name in names}
     is_seen = any(value != "" for value in seen.values())
     columns = (
@@ -50,7 +50,7 @@ def rms_table(report: Report) -> Table:
     rows: list[list[Any]] = []
     for name in names:
         spec = ".3e" if is_wide or name not in torques else ".4f"
-        second = seen[name] if is_seen else beside[name]
+        second = seen[name] if is_seen else by_eq64[name]
         rms = [
             value if value == "" else format(value, spec)
             for value in (metrics[f"{name}.rms"], second)
@@ -73,12 +73,12 @@ def short_name(column: str) -> str:
 
 def metrics_table(report: Report) -> Table:
     """Tabulate what `rms_table` leaves out; below stands why a metric is missing."""
-    columns = Column(is_label=True), Column()
+    columns, in_rms_table = (Column(is_label=True), Column()), table_v_columns(report["metrics"])
     shown = [
         name
         for name in shown_names([report])
         if not name.endswith(tuple(f".{key}" for key in IN_RMS_TABLE))
-        or not _is_of_table_v(name, report)
+        or name.rpartition(".")[0] not in in_rms_table
     ]
     return Table(
         "further metrics",
@@ -145,10 +145,6 @@ def _groups(reports: Sequence[Report], names: Sequence[str]) -> list[Group]:
             meanings |= {f"{name.rpartition('.')[2] or name}: {text}": None} if text else {}
         groups.append(Group(rows, title, "; ".join(meanings)))
     return groups
-
-
-def _is_of_table_v(name: str, report: Report) -> bool:
-    return name.rpartition(".")[0] in table_v_columns(report["metrics"])
 
 
 def _demand_on_axes(reports: Sequence[Report]) -> list[Group]:

@@ -125,7 +125,7 @@ def sizing(flight: AnalysedLog) -> dict[str, float]:
     return {f"sizing.{name}": value for name, value in numbers.items()}
 
 
-def requirements(
+def load_requirements(
     actuators: BaseActuatorSettings, numbers: Mapping[str, float]
 ) -> Iterator[LoadRequirement]:
     """Yield what is asked of each part of actuators by the metrics, and what the part has."""
@@ -164,14 +164,14 @@ class BaseDemand:
 
     def of(self, start: int, stop: int) -> Demand:
         """Return the demand of the rows from ``start`` to before ``stop``."""
-        torque = self._asked(start, stop)
+        torque = self._commanded(start, stop)
         if self._flown.wheel_count:
             momentum = self._held(start, stop)
         else:
-            momentum = self._given(start, stop, torque)
+            momentum = self._taken_up(start, stop, torque)
         return Demand(torque, momentum, self._log.omega_base[start:stop])
 
-    def _asked(self, start: int, stop: int) -> Array:
+    def _commanded(self, start: int, stop: int) -> Array:
         """Return the torque commanded for the interval before each row, or else the one given."""
         torque = self._log.applied_torque[start:stop, :3]
         if self._log.commanded_torque is None:
@@ -181,7 +181,7 @@ class BaseDemand:
             commands = np.concatenate([np.full((1, 3), np.nan), commands])
         return np.where(np.isfinite(commands), commands, torque)
 
-    def _given(self, start: int, stop: int, torque: Array) -> Array:
+    def _taken_up(self, start: int, stop: int, torque: Array) -> Array:
         """Return what the wheels must have taken up, by the mean of an interval's two attitudes."""
         axes = axes_of(self._log.rows(max(start - 1, 0), stop))
         before = axes[:, :, :-1]

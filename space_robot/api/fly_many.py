@@ -108,29 +108,20 @@ def _fly_groups(
     flown: dict[int, FlownFlight] = {}
     for group in batches(_checked(scenarios)):
         flights = [flight for _, flight in group]
-        _compile(flights)  # has a progress line of its own
+        compile_kernels(any(flight.plant.names.actuators for flight in flights))
+        if len(flights) > 1:
+            compile_lanes()
+        # after the compilation, which has a progress line of its own
         if progress and is_shown_at_start and not flown:
             progress(0)
         if len(flights) == 1:
             over = [fly_in_process(flights[0], keep_log=keep_log)]
         else:
-            over = _fly_batch(flights, keep_log)
+            over = [
+                FlownFlight(flights[one.flight], one.ending, None, one.log, keep_log)
+                for one in FlightBatch(flights).fly()
+            ]
         flown |= zip((number for number, _ in group), over, strict=True)
         if progress:
             progress(len(flown))
     return [flown[number] for number in sorted(flown)]
-
-
-def _compile(flights: list[Flight]) -> None:
-    """Compile what the flights of a group need, once an installation."""
-    compile_kernels(any(flight.plant.names.actuators for flight in flights))
-    if len(flights) > 1:
-        compile_lanes()
-
-
-def _fly_batch(flights: list[Flight], keep_log: bool) -> list[FlownFlight]:
-    """Fly the flights of one batch, whose kernels are compiled."""
-    return [
-        FlownFlight(flights[flown.flight], flown.ending, None, flown.log, keep_log)
-        for flown in FlightBatch(flights).fly()
-    ]

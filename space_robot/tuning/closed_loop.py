@@ -69,7 +69,7 @@ class LinearLoop(NamedTuple):
     """(m, 3 m) the same by noise."""
 
 
-def loop_of(
+def linear_loop(
     motion: SmallMotion, law: LinearLaw, weight: float, reported: float = 1.0, actual: float = 1.0
 ) -> LinearLoop:
     """Return the closed loop of a law.
@@ -99,13 +99,13 @@ def loop_of(
     none = np.zeros((axes, count))
     e = parts["error_noise"] - np.hstack([rate, none]) @ parts["robot"]
     r = np.hstack([none, rate]) @ parts["robot"]
-    noisy, of_pair = r + parts["rate_noise"], r + parts["pair_noise"]
+    noisy, pair_rate = r + parts["rate_noise"], r + parts["pair_noise"]
     signals = {"error": e, "error_rate": -noisy, "rho": -e, "rho_rate": noisy}
     if len(parts["force"]):
         signals["applied_force"] = reported * parts["force"]
     if has_estimate:
         assert law.estimate is not None
-        acceleration = (of_pair - parts["last_rate"]) / law.period
+        acceleration = (pair_rate - parts["last_rate"]) / law.period
         pair = reported * parts["force"] - law.estimate @ acceleration
         signals["n_hat"] = parts["n_hat"] + weight * (pair - parts["n_hat"])
     states, force = law.step @ parts["law"], law.force_by_state @ parts["law"]
@@ -116,7 +116,7 @@ def loop_of(
     if len(parts["force"]):
         rows.append(force)
     if has_estimate:
-        rows += [signals["n_hat"], of_pair]
+        rows += [signals["n_hat"], pair_rate]
     whole, size = np.vstack(rows), force.shape[1] - 3 * axes
     return LinearLoop(whole[:, :size], whole[:, size:], force[:, :size], force[:, size:])
 
@@ -154,9 +154,9 @@ class RigidLoop:
         self._weight = weight
 
     def radius(self, reported: float = 1.0, actual: float = 1.0) -> float:
-        """Return the largest growth in a tick, with torque scales as in `loop_of`."""
+        """Return the largest growth in a tick, with torque scales as in `linear_loop`."""
         return max(
-            growth(loop_of(*part, self._weight, reported, actual).step) for part in self._parts
+            growth(linear_loop(*part, self._weight, reported, actual).step) for part in self._parts
         )
 
     def is_stable(self, reported: float = 1.0, actual: float = 1.0) -> bool:
@@ -189,7 +189,7 @@ class RigidLoop:
         return limit
 
     def _is_stable(self, index: int, reported: float, actual: float) -> bool:
-        loop = loop_of(*self._parts[index], self._weight, reported, actual)
+        loop = linear_loop(*self._parts[index], self._weight, reported, actual)
         return growth(loop.step) <= 1.0 + SLOWEST_GROWTH
 
 

@@ -23,7 +23,7 @@ from space_robot_control.navigation.rate_filters import low_pass_weight
 from space_robot_model.robot import Robot
 from space_robot_model.robot.gears import FlexibleModel, flexible_model, geared_joints
 
-from .closed_loop import SLOWEST_GROWTH, SmallMotion, bisect, loop_of
+from .closed_loop import SLOWEST_GROWTH, SmallMotion, bisect, linear_loop
 from .inertia import J0, Posture, inertia_in_rho, postures_at
 from .linear_law import LinearLaw, linear_laws
 
@@ -146,7 +146,7 @@ def check_flexible(law: ControlLaw, motions: FlexibleMotions, corner_hz: float) 
     def radii(corner: float, laws: Iterable[LinearLaw]) -> Iterator[float]:
         weight = low_pass_weight(corner, period) or 1.0
         for motion, linear in zip(motions.configurations, laws, strict=True):
-            yield _fast_growth(loop_of(motion, linear, weight).step, period, least)
+            yield _fast_growth(linear_loop(motion, linear, weight).step, period, least)
 
     def is_stable(corner: float, laws: Iterable[LinearLaw]) -> bool:
         return all(radius <= 1.0 + SLOWEST_GROWTH for radius in radii(corner, laws))

@@ -33,7 +33,7 @@ from space_robot_control.navigation.rate_filters import low_pass_weight
 from .closed_loop import SLOWEST_GROWTH, RigidLoop
 from .flexible import FlexibleCheck
 from .inertia import J0, Posture
-from .linear_law import depends_on_posture, force_by_rate, linear_laws
+from .linear_law import linear_laws
 from .spectrum import LEAST_MARGIN, MassCheck, Spectrum, spectrum
 
 Array = NDArray[np.float64]
@@ -201,9 +201,8 @@ def noise_gain(law: ControlLaw, postures: Sequence[Posture], weight: float = 1.0
         postures: of the nominal robot.
         weight: of the low-pass of the time-delay pair; 1: none.
     """
-    some = _extreme(postures) if depends_on_posture(law, postures) else postures[:1]
-    gains = [np.abs(np.diag(force_by_rate(law, posture, weight))) for posture in some]
-    per_rate = np.max(gains, axis=0)
+    linear = linear_laws(law, _extreme(postures))
+    per_rate = np.max([np.abs(np.diag(own.force_by_rate(weight))) for own in linear], axis=0)
     if len(per_rate) < len(law.memory.s):  # no torque on the base
         return np.concatenate([np.zeros(3), per_rate])
     gain: Array = per_rate.copy()

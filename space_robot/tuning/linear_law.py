@@ -51,6 +51,17 @@ class LinearLaw(NamedTuple):
         """Return True if the force depends on one of `law_trial.INPUTS`, at once or later."""
         return bool(self.force_by[name].any() or self.state_by[name].any())
 
+    def force_by_rate(self, weight: float = 1.0) -> Array:
+        """Return the force (m, m) of a tick by noise on the rates measured in the same tick, N m s.
+
+        The noise is in edot, rhodot and N_hat: in this as ``-w H^ / period`` with the estimate's
+        inertia H^ and the ``weight`` w of the low-pass of its pair (1: none).
+        """
+        force = self.force_by["rho_rate"] - self.force_by["error_rate"]
+        if self.estimate is not None:
+            force = force - weight / self.period * self.force_by["n_hat"] @ self.estimate
+        return force
+
 
 def linear_law(law: ControlLaw, posture: Posture, inertia_scale: float = 1.0) -> LinearLaw:
     """Return the linear part of a law in a posture.
@@ -76,29 +87,6 @@ def linear_law(law: ControlLaw, posture: Posture, inertia_scale: float = 1.0) ->
         force_by_state[:, kept],
         {name: column[:axes] for name, column in columns.items()},
     )
-
-
-def force_by_rate(law: ControlLaw, posture: Posture, weight: float = 1.0) -> Array:
-    """Return the force (m, m) of a tick by noise on the rates measured in the same tick, N m s.
-
-    The noise is in edot, rhodot and N_hat: in this as ``-w H^ / period`` with the estimate's
-    inertia H^ and the weight w of the low-pass of its pair.
-
-    Args:
-        law: with its gains and period; it is not changed.
-        posture: of the nominal robot.
-        weight: w; 1: no low-pass.
-    """
-    trial = LawTrial(law, posture)
-    axes, inertia = posture.axes, assumed_inertia(law, posture)
-    signals = {"error_rate": -np.eye(axes), "rho_rate": np.eye(axes)}
-    if inertia is not None:
-        signals["n_hat"] = -weight / law.period * inertia
-    columns = [
-        trial.run({name: values[:, axis] for name, values in signals.items()})[:axes]
-        for axis in range(axes)
-    ]
-    return np.stack(columns, axis=1)
 
 
 def assumed_inertia(law: ControlLaw, posture: Posture, scale: float = 1.0) -> Array | None:
@@ -195,22 +183,20 @@ class LawTrial:
         assign(signals, base_is_free=posture.axes == posture.robot.n)
         return block
 
-    def run(self, moved: Mapping[str, Array]) -> Array:
-        """Return changes of force and memory in a tick, by signals (m,) that are not zero."""
-        ticks = []
-        for step in (STEP, 2.0 * STEP):
-            self._restore()
-            self._bytes[:] = self._rest_bytes
-            for name, values in moved.items():
-                self._inputs[name][:] = step * values
-            if "rho" in moved or "rho_rate" in moved:
-                self._move_state()
-            ticks.append(self._after_tick())
-        return _slope(*ticks)
-
     def columns_of(self, name: str, axes: int) -> Array:
         """Return changes of force and memory by a signal, one column for each axis."""
-        return np.stack([self.run({name: unit}) for unit in np.eye(axes)], axis=1)
+        columns = []
+        for unit in np.eye(axes):
+            ticks = []
+            for step in (STEP, 2.0 * STEP):
+                self._restore()
+                self._bytes[:] = self._rest_bytes
+                self._inputs[name][:] = step * unit
+                if name in ("rho", "rho_rate"):
+                    self._move_state()
+                ticks.append(self._after_tick())
+            columns.append(_slope(*ticks))
+        return np.stack(columns, axis=1)
 
     def columns_of_memory(self) -> Array:
         """Return changes of force and memory by each number of the memory.

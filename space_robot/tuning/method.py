@@ -190,10 +190,10 @@ def tune(
             most = _bandwidth_at_ripple(task, name, own_rule, most)
         tuned[name] = own_rule(most)
     incremental = nominal_estimate(task, design.weight)
-    of_indi, most = partial(tune_indi, task, incremental), incremental.bandwidth
+    indi_rule, most = partial(tune_indi, task, incremental), incremental.bandwidth
     if has_ripple and design.kind == CONSTANT:
-        most = _bandwidth_at_ripple(task, "indi", of_indi, most, design.weight)
-    tuned["indi"] = of_indi(most)
+        most = _bandwidth_at_ripple(task, "indi", indi_rule, most, design.weight)
+    tuned["indi"] = indi_rule(most)
     tuned["dob"] = tune_dob(task, observer)
     tuned["adrc"] = tune_adrc(task, replace(constant, weight=first.weight))
     weight = design.weight

@@ -18,7 +18,7 @@ from space_robot_control.laws import Signals, find_law
 from space_robot_control.laws.base import NOMINAL_INERTIA, ControlLaw, force_of
 from space_robot_msgs_py.errors import InputError
 
-from .closed_loop import bisect, loop_of, rigid_motion
+from .closed_loop import bisect, linear_loop, rigid_motion
 from .linear_law import assumed_inertia, linear_law
 from .noise import Noise
 from .task import TuningTask
@@ -87,7 +87,7 @@ def linear_ripple(
     """
     law, posture = find_law(name)(gains, task.period), task.postures[0]
     motion = rigid_motion(task.inertia[0], posture, task.period)
-    loop = loop_of(motion, linear_law(law, posture), weight)
+    loop = linear_loop(motion, linear_law(law, posture), weight)
     inputs = np.hstack(_noise_of(task, law))
     driven = inputs @ loop.by_noise.T
     states = np.empty_like(driven)
@@ -130,8 +130,8 @@ def _noise_of(task: TuningTask, law: ControlLaw) -> tuple[Array, Array, Array]:
     """Return (K, m) e, rhodot, and the rhodot that the law's time-delay pair takes."""
     noise, axes = task.noise, task.postures[0].axes
     assert noise
-    of_pair = noise.measured_rates if law.estimate == NOMINAL_INERTIA else noise.rates
-    return noise.errors[:, -axes:], noise.rates[:, -axes:], of_pair[:, -axes:]
+    pair_rates = noise.measured_rates if law.estimate == NOMINAL_INERTIA else noise.rates
+    return noise.errors[:, -axes:], noise.rates[:, -axes:], pair_rates[:, -axes:]
 
 
 def _deviation(force: Array) -> Array:

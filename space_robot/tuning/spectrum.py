@@ -44,7 +44,6 @@ by a share of the order of the law's bandwidth times ``period / w``; `closed_loo
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -164,27 +163,6 @@ class MassCheck:
     """The largest one of the sample."""
 
 
-def drawn_robots(
-    robot: Robot, share: float, count: int = DRAWS, seed: int = SEED
-) -> Iterator[Robot]:
-    """Yield robots whose bodies' masses and inertias are wrong by up to ``share``.
-
-    Args:
-        robot: with the right ones.
-        share: mu; the factors are uniform in ``1 - mu`` to ``1 + mu``.
-        count: of robots.
-        seed: of the generator.
-    """
-    rng = np.random.default_rng(seed)
-    for _ in range(count):
-        of_mass, of_inertia = 1.0 + share * rng.uniform(-1.0, 1.0, (2, len(robot.mass)))
-        yield replace(
-            robot,
-            mass=robot.mass * of_mass,
-            inertia=robot.inertia * of_inertia[:, np.newaxis, np.newaxis],
-        )
-
-
 def drawn_inertias(
     robot: Robot,
     settings: MissionSettings,
@@ -192,13 +170,21 @@ def drawn_inertias(
     step: float = COARSE,
     controls_base: bool = True,
 ) -> Array:
-    """Return H_S, or H_f, (R, L, m, m) of `drawn_robots` along a mission, see `inertia_along`."""
-    return np.array(
-        [
-            inertia_along(wrong, settings, step, controls_base)
-            for wrong in drawn_robots(robot, share)
-        ]
-    )
+    """Return H_S, or H_f, (R, L, m, m) along a mission of robots whose bodies are not as in a file.
+
+    Each body has its own factor on its mass and its own on its inertia, ``1 - share`` to
+    ``1 + share``. Other arguments are those of `inertia_along`.
+    """
+    rng, inertias = np.random.default_rng(SEED), []
+    for _ in range(DRAWS):
+        masses, inertia = 1.0 + share * rng.uniform(-1.0, 1.0, (2, len(robot.mass)))
+        wrong = replace(
+            robot,
+            mass=robot.mass * masses,
+            inertia=robot.inertia * inertia[:, np.newaxis, np.newaxis],
+        )
+        inertias.append(inertia_along(wrong, settings, step, controls_base))
+    return np.array(inertias)
 
 
 def check_masses(spectrum: Spectrum, assumed: Array, drawn: Array, share: float) -> MassCheck:

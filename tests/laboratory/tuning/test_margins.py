@@ -16,10 +16,10 @@ from numpy.typing import NDArray
 from space_robot.cli.options import remarks_on
 from space_robot.flight.plan import Flight, Scenario, resolve
 from space_robot.flight.simulate import simulate
-from space_robot.tuning.closed_loop import RigidLoop, loop_of, rigid_motion
+from space_robot.tuning.closed_loop import RigidLoop, linear_loop, rigid_motion
 from space_robot.tuning.gain_check import GainCheck, check_gains, noise_gain, pair_corner
 from space_robot.tuning.inertia import SAMPLING, Posture, inertia_along, postures_along, postures_at
-from space_robot.tuning.linear_law import LinearLaw, force_by_rate, linear_law, linear_laws
+from space_robot.tuning.linear_law import LinearLaw, linear_law, linear_laws
 from space_robot.tuning.spectrum import check_masses, drawn_inertias, eigenvalues, spectrum
 from space_robot.tuning.warning import margin_remarks
 from space_robot_control.controller.settings import ControllerNodeSettings
@@ -82,7 +82,7 @@ def test_a_loop_of_noise_is_the_recursion_of_the_law() -> None:
     law = find_law("pd")({"k_p": np.full(9, 40.0), "k_d": np.full(9, 6.0)}, PERIOD)
     inertia = np.diag(np.arange(1.0, 10.0))
     (linear,) = linear_laws(law, [posture])
-    loop = loop_of(rigid_motion(inertia, posture, PERIOD), linear, 1.0)
+    loop = linear_loop(rigid_motion(inertia, posture, PERIOD), linear, 1.0)
     rng, state = np.random.default_rng(0), np.zeros(18)
     p, r = np.zeros(9), np.zeros(9)
     for _ in range(100):
@@ -345,9 +345,9 @@ def test_noise_gain_is_that_of_the_gains(weight: float) -> None:
     np.testing.assert_allclose(noise_gain(LAWS["tde_stc"], [posture()], weight), expected)
     # `dob` has a weight of its own; `adrc` sees positions alone
     own = 80.0 * PERIOD / (1.0 + 80.0 * PERIOD)
-    by_rate = force_by_rate(LAWS["dob"], posture())
+    by_rate = linear_law(LAWS["dob"], posture()).force_by_rate()
     np.testing.assert_allclose(-np.diag(by_rate), DIAGONAL * (own / PERIOD + 30.0), rtol=1e-9)
-    assert not force_by_rate(LAWS["adrc"], posture()).any()
+    assert not linear_law(LAWS["adrc"], posture()).force_by_rate().any()
 
 
 class Gains(LawGains):
