@@ -21,7 +21,7 @@ from space_robot.flight.plan import Flight, Scenario, resolve
 from space_robot.flight.replay.choice import ControllerChoice
 from space_robot.flight.simulate import simulate
 from space_robot.processes.interruption import Interrupted
-from space_robot.scenario.objects import law_parameter
+from space_robot.scenario.node_settings import option_parameters
 from space_robot_control.controller.gains import split_gains
 from space_robot_control.laws import ControlLaw, LawGains, find_law, importable_name, laws
 from space_robot_control.laws.base import LawError, force_of
@@ -140,7 +140,8 @@ def test_files_of_one_name_in_two_folders_are_two_laws(folder: Path) -> None:
     assert importable_name(two) == "other/my_law.py:Mine"
     for law in (one, two):
         assert find_law(importable_name(law)) is law, "what nodes and bags say finds it again"
-        assert law_parameter(law) == importable_name(law)
+        controller = option_parameters(Scenario(controller=law))["controller"]
+        assert controller["controller"] == importable_name(law)
 
 
 @pytest.mark.parametrize(
