@@ -14,9 +14,8 @@ from typing import Any
 import pytest
 import yaml
 from flights import space_robot_here
+from matplotlib.figure import Figure
 from paths import ROOT
-
-from space_robot.analysis.figures import style
 
 HERE = Path(__file__).parent
 CHAINS: dict[str, list[str]] = yaml.safe_load((HERE / "commands.yaml").read_text("utf-8"))
@@ -38,7 +37,7 @@ def printed(chain: str, folder: Path) -> list[str]:
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(folder)
         patch.setenv("COLUMNS", "100")
-        patch.setattr(style, "_print", lambda figure, file, format: lines.extend(_of(figure)))
+        patch.setattr(Figure, "savefig", lambda figure, *_, **__: lines.extend(_of(figure)))
         for command in CHAINS[chain]:
             lines.append(f"$ space-robot {command}")
             there = _pages(folder)
