@@ -19,7 +19,7 @@ from ..flight.compilation import compile_kernels
 from ..flight.plan import Flight, resolve
 from ..scenario.options import FlightPlan
 from .bench import Bench
-from .flown_flight import FlownFlight, fly_with_progress
+from .flown_flight import FlownFlight, fly_in_process
 from .options_html import options_html
 
 OF_THE_GRAPH = (
@@ -138,7 +138,7 @@ class Scenario(FlightPlan):
         path, flight = None if bag is None else as_path(bag, "bag"), self.check()
         for remark in flight.remarks:
             warnings.warn(remark, stacklevel=2)
-        return fly_with_progress(flight, path, progress, keep_log)
+        return fly_in_process(flight, path, progress, keep_log)
 
     def bench(self, record: bool = True) -> Bench:
         """Return a bench at the flight's first tick.
