@@ -312,7 +312,7 @@ def flight_report(
 def fly_in_process(
     flight: Flight,
     bag: Path | None = None,
-    progress: Callable[[float], object] | None = None,
+    progress: Callable[[float], object] | bool | None = None,
     keep_log: bool = True,
 ) -> FlownFlight:
     """Fly a checked flight from the present state of its plant.
@@ -320,7 +320,7 @@ def fly_in_process(
     Args:
         flight: to be flown.
         bag: folder to record to; None: none.
-        progress: called regularly with the simulated time, s.
+        progress: called regularly with the simulated time, s; True: a progress line.
         keep_log: False: only the metrics are kept.
 
     Raises:
@@ -329,10 +329,14 @@ def fly_in_process(
     flight.check_in_process()
     if bag:
         check_bag_path(bag)
-    compile_kernels(bool(flight.plant.names.actuators))
+    compile_kernels(bool(flight.plant.names.actuators))  # has a progress line of its own
+    if progress is True:
+        _ = flight.supervisor  # compiled, or refused, before the line begins
+        with flight_progress(flight.ticks * flight.period, flight.law.name) as show_time:
+            return fly_in_process(flight, bag, show_time, keep_log)
 
     def show(tick: int) -> None:
-        if progress:
+        if callable(progress):
             progress(tick * flight.period)
 
     try:
@@ -342,22 +346,3 @@ def fly_in_process(
             raise
         log, ending = error.log, Ending.early(error, flight.period)
     return FlownFlight(flight, ending, bag, log, keep_log)
-
-
-def fly_with_progress(
-    flight: Flight,
-    bag: Path | None,
-    progress: Callable[[float], object] | bool | None,
-    keep_log: bool,
-) -> FlownFlight:
-    """Fly as `fly_in_process` does; ``progress`` True shows a progress line.
-
-    Raises:
-        InputError: see `fly_in_process`.
-    """
-    if progress is not True:
-        return fly_in_process(flight, bag, progress or None, keep_log)
-    _ = flight.supervisor  # compiled, or refused, before the line begins
-    compile_kernels(bool(flight.plant.names.actuators))  # has a progress line of its own
-    with flight_progress(flight.ticks * flight.period, flight.law.name) as show:
-        return fly_in_process(flight, bag, show, keep_log)

@@ -175,7 +175,7 @@ class Scenario(StrictModel, Options):
         Raises:
             InputError: see `check`; or the bag cannot be created, or there is no room for a log.
         """
-        from ..api.flown_flight import fly_with_progress
+        from ..api.flown_flight import fly_in_process
         from ..console.progress import check_progress
 
         if self.controller is None:
@@ -184,7 +184,7 @@ class Scenario(StrictModel, Options):
         path, flight = None if bag is None else as_path(bag, "bag"), self.check()
         for remark in flight.remarks:
             warnings.warn(remark, stacklevel=2)
-        return fly_with_progress(flight, path, progress, keep_log)
+        return fly_in_process(flight, path, progress, keep_log)
 
     def bench(self, record: bool = True) -> Bench:
         """Return a bench at the flight's first tick.
