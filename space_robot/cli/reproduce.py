@@ -75,7 +75,7 @@ def reproduce(
     from ..paper.reproduction.flights import ROWS, Equipment, TableRow
     from ..paper.reproduction.reproduce import check_folder
     from ..paper.reproduction.reproduce import reproduce as run
-    from ..processes.pool import cores
+    from ..processes.executor import cores
 
     rows = [TableRow.parse(text) for text in dict.fromkeys(only)] or list(ROWS)
     check_folder(out)

@@ -32,7 +32,7 @@ from ...analysis.words import of_statistic
 from ...console.files import whole_folder
 from ...flight.plan import Flight, FlightPlan, resolve
 from ...flight.simulate import simulate
-from ...processes.pool import cores, run_all
+from ...processes.executor import cores, run_all
 from ...tuning.demand import demand
 from ...tuning.task import AUTO, TuningOptions
 from ...tuning.warning import estimate_remark

@@ -6,6 +6,7 @@ import json
 import platform
 import shutil
 from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -17,7 +18,7 @@ from ...analysis.figures.figure_set import FigureFolder
 from ...analysis.template import template
 from ...console.tables import as_csv, as_markdown, as_records
 from ...flight.plan import Flight, FlightPlan, resolve
-from ...processes.pool import run_all
+from ...processes.executor import run_all
 from ...processes.software import commit, versions
 from .claims import claims, claims_table
 from .figures import comparisons, figure_groups
@@ -101,10 +102,7 @@ def _fly(
     progress: Callable[[int], Callable[[], None]],
 ) -> list[Result]:
     """Fly and draw every flight; return the results in the order of ``planned``."""
-
-    def fly_one(flight: Planned) -> Result:
-        return fly(flight, duration, figures, equipment)
-
+    fly_one = partial(fly, duration=duration, figures=figures, equipment=equipment)
     order = sorted(planned, key=lambda flight: not flight.shown)  # longest first
     results = dict(zip(order, run_all(fly_one, order, jobs, progress), strict=True))
     return [results[flight] for flight in planned]
