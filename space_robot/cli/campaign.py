@@ -131,8 +131,29 @@ def run(
 
 
 def name_of(file: Path) -> str:
-    """Return the name of a campaign: of its file, or of the folder of a ``campaign.yaml``."""
-    return file.parent.resolve().name if file.stem == "campaign" else file.stem
+    """Return the name of a campaign: of its file, or of the folder of its ``campaign.yaml``."""
+    in_own_folder = file.stem in ("campaign", "study")
+    return file.parent.resolve().name if in_own_folder else file.stem
+
+
+@campaign.command()
+@click.argument("folder", type=click.Path(path_type=Path), metavar="DIR")
+@click.argument("file", type=click.Path(path_type=Path), metavar="FILE")
+def export(folder: Path, file: Path) -> None:
+    """Write the table of a campaign as Parquet or CSV, a row a flight.
+
+    DIR is the folder of `campaign run`, finished or not; the suffix of FILE chooses the format. A
+    CSV file is without the bands over time.
+
+    \b
+    Examples:
+      space-robot campaign export campaigns/a a.parquet
+      space-robot campaign export campaigns/a a.csv
+    """
+    from ..campaign.flown import FlownCampaign
+
+    FlownCampaign.open(folder).export(file)
+    click.echo(f"wrote {file}", err=True)
 
 
 @campaign.command()

@@ -75,7 +75,7 @@ def reproduce(
     from ..paper.flights import ROWS, Equipment, TableRow
     from ..paper.reproduce import check_results_folder
     from ..paper.reproduce import reproduce as run
-    from ..processes.pool import cores
+    from ..processes.executor import cores
 
     rows = [TableRow.parse(text) for text in dict.fromkeys(only)] or list(ROWS)
     check_results_folder(out)

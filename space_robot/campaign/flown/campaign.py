@@ -6,108 +6,31 @@ campaign.table, campaign.verdicts, campaign.rerun(4711).log
 
 from __future__ import annotations
 
-import re
-import shutil
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import closing, contextmanager, suppress
-from dataclasses import dataclass
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import yaml
 
 from space_robot_msgs_py.config.arguments import as_path, as_positive, as_whole_number
+from space_robot_msgs_py.config.installation import install_command
 from space_robot_msgs_py.config.validation import short, validate
 from space_robot_msgs_py.config.yaml_text import read_file
-from space_robot_msgs_py.errors import FlightError, InputError
+from space_robot_msgs_py.errors import InputError
 
 from ...analysis.own_metric import SESSION, MetricFunction, check_names, text_of
-from ...console.files import make_folder
 from ...console.progress import check_progress, rated_progress
-from ...flight.ending import DIVERGED, UNANSWERED
-from ...flight.simulate import simulate
-from ...processes.pool import check_scheduler, cores, run_many
+from ...processes.executor import check_scheduler, cores, start_fork_server
 from ...processes.scratch_folder import ScratchFolder
-from ..row.fly import RowFlyer
-from ..row.row import Row, Task
-from ..store.folder import BAGS, MANIFEST, begin_or_resume, held_folder
-from ..store.journal import Journal
-from ..store.recovery import open_journal
-from ..store.table import check_tables
+from ..store.store import DATABASE, begin_or_resume, held_store
 from ..study import Study, read_study
+from .bags import fly_bags
 from .campaign_html import study_html
-from .current_table import WRITTEN, write_if_older
 from .flights import Flights, Progress
 from .flown_campaign import FlownCampaign
-from .precision import is_met
 from .preparation import Preparation
-
-
-@dataclass(frozen=True)
-class BagFlyer:
-    """Flies a task and records its bag."""
-
-    flyer: RowFlyer
-    folder: Path
-    """Folder of the bags."""
-
-    def __call__(self, task: Task) -> None:
-        """Fly a task; the bag gets its final name once it is complete."""
-        unfinished = self.folder / f".{bag_name(task)}"
-        flight = self.flyer.draws.flight(task.run, task.law)
-        with suppress(FlightError):  # its row says so
-            simulate(flight, unfinished)
-        unfinished.rename(self.folder / bag_name(task))
-
-
-def bag_name(task: Task) -> str:
-    """Return the folder name of a task's bag, such as ``4711_tde_stc``."""
-    return f"{task.run}_{re.sub(r'[^A-Za-z0-9_.=-]', '_', task.law)}"
-
-
-def fly_bags(folder: Path, flyer: RowFlyer, journal: Journal, runs: int, workers: int) -> None:
-    """Record the missing bags of the flights selected by the campaign's file.
-
-    Args:
-        folder: of the campaign, locked by this process.
-        flyer: of the campaign's tasks.
-        journal: with all rows.
-        runs: number of runs in the table.
-        workers: number of processes.
-
-    Raises:
-        InputError: a bag cannot be written.
-    """
-    if flyer.study.keep.bag == "never":
-        return
-    bags = folder.absolute() / BAGS
-    make_folder(bags)
-    for unfinished in bags.glob(".*"):  # of a process that was killed
-        shutil.rmtree(unfinished)
-    tasks = [
-        task for task in _wanted(flyer.study, journal, runs) if not (bags / bag_name(task)).exists()
-    ]
-    if not tasks:
-        return
-    flown = run_many(BagFlyer(flyer, bags), tasks, workers=workers)
-    with closing(flown) as done:
-        for result in done:
-            if result.error is not None:
-                raise InputError(f"{bags / bag_name(result.item)}: {result.error}")
-
-
-def _wanted(study: Study, journal: Journal, runs: int) -> Iterator[Task]:
-    """Yield the tasks whose bags are requested; refused and killed flights have no bag."""
-    for row in journal.rows(runs):
-        has_flight = row.is_complete or row.outcome in (DIVERGED, UNANSWERED)
-        if has_flight and (study.keep.bag == "always" or _has_failed(study, row)):
-            yield row.task
-
-
-def _has_failed(study: Study, row: Row) -> bool:
-    """Return whether a flight ended early or missed a requirement."""
-    return not (row.is_complete and all(is_met(row, study.require, name) for name in study.require))
 
 
 class Campaign:
@@ -179,7 +102,7 @@ class Campaign:
         progress: Callable[[Progress], object] | bool | None = None,
         warn: Callable[[str], object] = warnings.warn,
     ) -> FlownCampaign:
-        """Fly the campaign, or its remaining flights, and write its table.
+        """Fly the campaign, or its remaining flights.
 
         The table depends only on file, seed, runs and software, not on the number of workers or on
         interruptions. After Ctrl-C (KeyboardInterrupt) it contains the completed flights.
@@ -195,51 +118,47 @@ class Campaign:
                 With such a limit flights are flown one by one, not eight at a time.
             progress: called at the beginning and after each group of up to eight flights; True: a
                 progress line, in a terminal or a notebook.
-            warn: called with a line for each damaged file of the folder, whose lost rows are
-                flown again, and for each law whose flights are flown one by one.
+            warn: called with a line if the folder's copy of the study was changed, and for each
+                law whose flights are flown one by one.
 
         Raises:
             InputError: something cannot be flown; the folder is another campaign's; disk full; a
                 metric's function fails, or cannot be sent to the workers or kept in a folder.
         """
-        check_tables()
+        _check_pandas()
         check_progress(progress)
         if local := [n for n, text in self.study.metrics.items() if text.startswith(SESSION)]:
             check_local(local, out, workers, scheduler)
             workers = 0
             warn(f"metrics {', '.join(local)}: {OF_SESSION}: this process flies alone")
-        asked = Preparation.of(self.study, seed, runs)
+        prepared = Preparation.of(self.study, seed, runs)
         processes = cores() if workers is None else as_whole_number(workers, "workers", 0)
         if timeout_s is not None:
             as_positive(timeout_s, "timeout_s")
-        manifest = asked.manifest
+        if processes and scheduler is None:
+            start_fork_server()
+        manifest = prepared.manifest
         temporary = None if out is not None else ScratchFolder()
         folder = Path(temporary.name) if temporary else as_path(out, "out")
-        if scheduler is not None and not (folder / MANIFEST).exists():
-            check_scheduler(scheduler)  # before the folder is created
-        if self.study.metrics and not (folder / MANIFEST).exists():
-            asked.compile(is_in_lanes=timeout_s is None)
-            asked.try_metrics(processes, timeout_s if processes else None)
-        with held_folder(folder):
-            damage = begin_or_resume(folder, manifest, self._text or as_yaml(self.study))
-            journal, damage_of_rows = open_journal(folder, manifest)
-            with journal:
-                for line in (*damage, *damage_of_rows):
+        if not (folder / DATABASE).exists():  # before the folder is created
+            if scheduler is not None:
+                check_scheduler(scheduler)
+            if self.study.metrics:
+                prepared.compile(is_in_lanes=timeout_s is None)
+                prepared.try_metrics(processes, timeout_s if processes else None)
+        with held_store(folder) as store:
+            if changes := begin_or_resume(store, manifest, self._text or as_yaml(self.study)):
+                warn(changes)
+            flights = Flights(prepared.flyer, prepared.runs, store)
+            if not flights.are_complete:
+                for line in prepared.notes:
                     warn(line)
-                flights = Flights(asked.flyer, asked.runs, journal)
-                options = {"workers": processes, "scheduler": scheduler, "timeout_s": timeout_s}
-                try:
-                    if not flights.are_complete:
-                        for line in asked.notes:
-                            warn(line)
-                        asked.compile(is_in_lanes=timeout_s is None)
-                        journal.make_note(WRITTEN, "")  # the table is outdated
-                        with _shown(progress) as show:
-                            flights.fly(show, options)
-                finally:  # also after an error: write the table of all flown rows
-                    runs_of_table = flights.precision.stop
-                    write_if_older(folder, journal, manifest, runs_of_table)
-                fly_bags(folder, asked.flyer, journal, runs_of_table, processes)
+                prepared.compile(is_in_lanes=timeout_s is None)
+                with _shown(progress) as show:
+                    flights.fly(show, processes, scheduler, timeout_s)
+            stop = flights.precision.stop
+            rows = (row for row in store.rows() if row.task.run < stop)
+            fly_bags(folder, prepared.flyer, rows, processes)
         return FlownCampaign(folder, True, temporary, flights.kept)
 
     def _repr_html_(self) -> str:
@@ -257,6 +176,15 @@ def _shown(
         return
     with rated_progress("flights") as show:
         yield lambda p: show(p.done, p.total, f"{p.failed} failed" if p.failed else "")
+
+
+def _check_pandas() -> None:
+    try:
+        import pandas  # noqa: F401
+    except ImportError:
+        raise InputError(
+            f"a campaign's table needs pandas: {install_command('campaign')}"
+        ) from None
 
 
 OF_SESSION = "of this Python session (a notebook's or script's function, or a lambda)"

@@ -1,11 +1,11 @@
-"""Execution of the flights of a campaign that are not in its journal yet."""
+"""Execution of the flights of a campaign that are not in its store yet."""
 
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -13,10 +13,10 @@ from space_robot_msgs_py.compiled.lanes import WIDTH
 from space_robot_msgs_py.config.text import one_line_of
 
 from ...flight.ending import FAILED
-from ...processes.pool import OutOfTimeError, WorkerDiedError, run_many
+from ...processes.executor import OutOfTimeError, WorkerDiedError, run_many
 from ..row.fly import BatchFlyer, RowFlyer
 from ..row.row import KILLED, OUT_OF_TIME, Row, Task
-from ..store.journal import Journal
+from ..store.store import CampaignStore
 from .precision import Precision
 
 
@@ -34,26 +34,26 @@ class Progress(NamedTuple):
 
 
 class TaskBatches(Iterator[tuple[Task, ...]]):
-    """Tasks in groups of one law, to be flown together; it may go on after its end."""
+    """Batches of tasks of one law; iteration may go on after its end."""
 
     def __init__(self, tasks: Iterator[Task], size: int) -> None:
-        """Take up to ``size`` tasks into a group."""
+        """Take up to ``size`` tasks into a batch."""
         self._tasks, self._size = tasks, size
         self._waiting: dict[str, list[Task]] = {}
         self._single: deque[Task] = deque()
 
-    def split(self, batch: Sequence[Task]) -> None:
-        """Give out the tasks of a group again, one by one."""
+    def repeat_singly(self, batch: Sequence[Task]) -> None:
+        """Return the tasks of a batch again, one by one."""
         self._single.extend(batch)
 
     def __next__(self) -> tuple[Task, ...]:
-        """Return the next group."""
+        """Return the next batch."""
         if self._single:
             return (self._single.popleft(),)
         for task in self._tasks:
-            group = self._waiting.setdefault(task.law, [])
-            group.append(task)
-            if len(group) == self._size:
+            batch = self._waiting.setdefault(task.law, [])
+            batch.append(task)
+            if len(batch) == self._size:
                 return tuple(self._waiting.pop(task.law))
         if self._waiting:
             return tuple(self._waiting.pop(next(iter(self._waiting))))
@@ -63,29 +63,24 @@ class TaskBatches(Iterator[tuple[Task, ...]]):
 class Flights:
     """The flights of a campaign."""
 
-    def __init__(self, flyer: RowFlyer, runs: int, journal: Journal) -> None:
-        """Read the rows of the journal.
+    def __init__(self, flyer: RowFlyer, runs: int, store: CampaignStore) -> None:
+        """Count the rows of the store.
 
         Args:
             flyer: of the campaign's tasks.
             runs: of the campaign.
-            journal: open.
+            store: open for writing.
         """
-        self._flyer, self._runs, self._journal = flyer, runs, journal
+        self._flyer, self._runs, self._store = flyer, runs, store
         self._laws = flyer.study.laws
         self._done = np.zeros((runs, len(self._laws)), bool)
         self._failed = 0
         self.precision = Precision(flyer.study, runs, flyer.draws.grid)
-        for row in journal.rows(runs):
+        for row in store.rows():
             if row.is_final:  # results that may depend on the machine are flown again
                 self._count(row)
         self.kept = int(self._done.sum())
-        """Number of flights that were in the journal."""
-
-    @property
-    def count(self) -> int:
-        """Total number of flights."""
-        return self.precision.stop * len(self._laws)
+        """Number of flights that were in the store."""
 
     def missing(self) -> Iterator[Task]:
         """Yield the missing flights, in order, until the precision is reached."""
@@ -100,39 +95,57 @@ class Flights:
         """True if no flight is missing."""
         return next(self.missing(), None) is None
 
-    def fly(self, on_progress: Callable[[Progress], object], options: Mapping[str, Any]) -> None:
-        """Fly the missing flights; each row is stored in the journal at once.
+    def fly(
+        self,
+        on_progress: Callable[[Progress], object],
+        workers: int,
+        scheduler: str | None,
+        timeout_s: float | None,
+    ) -> None:
+        """Fly the missing flights; each row is stored at once.
 
         Args:
-            on_progress: called at the beginning and after every group of flights.
-            options: of `run_many`.
+            on_progress: called at the beginning and after every batch of flights.
+            workers: see `run_many`.
+            scheduler: see `run_many`.
+            timeout_s: longest time of a flight; flights with one are flown one by one.
 
         Raises:
-            InputError: the journal cannot be written, or the scheduler does not answer.
+            InputError: the store cannot be written, or the scheduler does not answer.
         """
-        # a time limit is that of a flight, so flights with one are flown one by one
-        size = WIDTH if options.get("timeout_s") is None else 1
-        tasks = TaskBatches(self.missing(), size)
-        done = run_many(BatchFlyer(self._flyer), tasks, **options)
-        with closing(done):
+        batches = TaskBatches(self.missing(), WIDTH if timeout_s is None else 1)
+        died: set[Task] = set()
+        running = run_many(
+            BatchFlyer(self._flyer),
+            batches,
+            workers=workers,
+            scheduler=scheduler,
+            timeout_s=timeout_s,
+        )
+        with closing(running):
             on_progress(self._progress)
-            for result in done:
-                if result.result is None and len(result.item) > 1:
-                    tasks.split(result.item)  # so that only the guilty flight has no row
+            for done in running:
+                rows, first = done.result, done.item[0]
+                if rows is None and len(done.item) > 1:
+                    batches.repeat_singly(done.item)  # only the one to blame gets no result
                     continue
-                for row in result.result or [self._unflown(result.item[0], result.error)]:
-                    self._journal.add(row)
+                if isinstance(done.error, WorkerDiedError) and first not in died:
+                    died.add(first)  # once more: whoever killed it may have meant something else
+                    batches.repeat_singly([first])
+                    continue
+                for row in rows or [self._without_result(first, done.error)]:
+                    self._store.add(row)
                     self._count(row)
                 on_progress(self._progress)
                 if self.precision.is_reached and self.are_complete:
                     return
 
-    def _unflown(self, task: Task, error: Exception | None) -> Row:
-        """Return the row of a flight whose process returned none."""
+    def _without_result(self, task: Task, error: Exception | None) -> Row:
         vary = self._flyer.draws.values(task.run)
-        if isinstance(error, (WorkerDiedError, OutOfTimeError)):
-            outcome = KILLED if isinstance(error, WorkerDiedError) else OUT_OF_TIME
-            return Row(task, outcome, str(error), vary=vary)
+        if isinstance(error, WorkerDiedError):
+            return Row(task, KILLED, f"{error} twice", vary=vary)
+        if isinstance(error, OutOfTimeError):
+            return Row(task, OUT_OF_TIME, str(error), vary=vary)
         assert error is not None
         return Row(task, FAILED, one_line_of(error), vary=vary).digested()
 
@@ -143,5 +156,6 @@ class Flights:
 
     @property
     def _progress(self) -> Progress:
-        done, total = int(self._done[: self.precision.stop].sum()), self.count
+        stop = self.precision.stop
+        done, total = int(self._done[:stop].sum()), stop * len(self._laws)
         return Progress(done, total, min(self.kept, total), self._failed)

@@ -8,6 +8,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
+import numpy as np
 from typing_extensions import Self
 
 from space_robot_control.laws.names import (
@@ -16,20 +17,22 @@ from space_robot_control.laws.names import (
     require_shipped_law,
 )
 from space_robot_msgs_py.config.arguments import as_path, as_whole_number
+from space_robot_msgs_py.config.installation import install_command
 from space_robot_msgs_py.config.validation import one_of, validate
 from space_robot_msgs_py.errors import InputError
 
 from ...api import FlownFlight, Scenario
 from ...api.flown_flight import fly_in_process
+from ...console.files import atomic_file, write_text
 from ..row.fly import RowFlyer
 from ..row.row import Task
-from ..store.folder import MANIFEST, STUDY, TABLE, check_regular, study_changes
-from ..store.manifest import Manifest, read_manifest
+from ..store.manifest import Manifest
 from ..store.software import software, texts_of
-from ..store.table import check_table, read_table
+from ..store.store import DATABASE, STUDY, open_store, study_changes
 from ..study import Law, Study
 from ..verdicts.requirements import Verdict, verdicts
 from .campaign_html import verdicts_html
+from .precision import Precision
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -45,7 +48,7 @@ class FlownCampaign:
         temporary: TemporaryDirectory[str] | None = None,
         kept: int = 0,
     ) -> None:
-        """Read the folder's manifest.
+        """Read the manifest.
 
         Args:
             folder: of the campaign.
@@ -54,13 +57,14 @@ class FlownCampaign:
             kept: number of flights that existed when the campaign was resumed.
 
         Raises:
-            InputError: it is not a campaign folder, or its manifest is damaged.
+            InputError: it is not a campaign folder, or its store is damaged.
         """
-        if not (folder / MANIFEST).is_file():
-            raise InputError(f"{folder}: not a campaign folder (it has no {MANIFEST})")
-        check_regular(folder)
         self.folder, self.kept, self._trust, self._temporary = folder, kept, trust, temporary
-        self.manifest: Manifest = read_manifest(folder / MANIFEST)
+        with open_store(folder) as store:
+            manifest = store.manifest
+        if manifest is None:
+            raise InputError(f"{folder}: no flight has been flown yet")
+        self.manifest: Manifest = manifest
 
     @classmethod
     def open(cls, folder: str | Path, trust: bool = False) -> Self:
@@ -71,7 +75,7 @@ class FlownCampaign:
             trust: allow `rerun` to import each ``module:Class`` and read each file it refers to.
 
         Raises:
-            InputError: it is not a campaign folder, or its manifest is damaged.
+            InputError: it is not a campaign folder, or its store is damaged.
         """
         return cls(as_path(folder, "folder"), trust)
 
@@ -87,13 +91,13 @@ class FlownCampaign:
 
     @cached_property
     def study(self) -> Study:
-        """The study that was flown, even if ``campaign.yaml`` was changed since."""
-        where = str(self.folder / MANIFEST)
+        """The study that was flown, even if ``study.yaml`` was changed since."""
+        where = str(self.folder / DATABASE)
         return validate(Study, self.manifest.study, f"{where}: study").named(where)
 
     @property
     def study_changes(self) -> str:
-        """Difference of ``campaign.yaml`` from the study that was flown, in a line; or empty."""
+        """Difference of ``study.yaml`` from the study that was flown, in a line; or empty."""
         return study_changes(self.folder / STUDY, self.study.content)
 
     @cached_property
@@ -101,10 +105,36 @@ class FlownCampaign:
         """All rows, one per flight, ordered by run, then by law.
 
         Raises:
-            InputError: the table cannot be read, or is damaged.
+            InputError: the store cannot be read, or is damaged.
         """
-        check_table(self.folder / TABLE, self.manifest.campaign)
-        return read_table(self.folder / TABLE, self.manifest.table)
+        columns, laws = self.manifest.table, self.study.laws
+        precision = Precision(self.study, self.runs, columns.grid)
+        with open_store(self.folder) as store:
+            rows = sorted(store.rows(), key=lambda row: (row.task.run, laws.index(row.task.law)))
+        for row in rows:
+            precision.add(row)
+        return columns.table(row for row in rows if row.task.run < precision.stop)
+
+    def export(self, path: str | Path) -> None:
+        """Write the table as Parquet or, without the bands, as CSV, by the suffix of ``path``.
+
+        Raises:
+            InputError: another suffix, the file exists or cannot be written, or pyarrow is missing.
+        """
+        file = as_path(path, "path")
+        one_of(file.suffix, (".parquet", ".csv"), "suffix", f" of {file}")
+        table = self.table
+        if file.suffix == ".csv":
+            is_band = [str(name).startswith("band.") for name in table]
+            text = table.loc[:, np.invert(is_band)].to_csv(index=False, lineterminator="\n")
+            write_text(text, file)
+            return
+        try:
+            import pyarrow  # noqa: F401
+        except ImportError:
+            raise InputError(f"{file}: needs pyarrow: {install_command('parquet')}") from None
+        with whole_file(file) as opened:
+            table.to_parquet(opened, engine="pyarrow", index=False)
 
     @cached_property
     def verdicts(self) -> list[Verdict]:
@@ -140,15 +170,11 @@ class FlownCampaign:
         Raises:
             InputError: the flight has no log or other columns, or a metric's function fails.
         """
-        import pandas
-
-        run = as_whole_number(run, "run", 0, self.runs - 1)
-        schema, task = self.manifest.table, Task(run, law)
-        row = self._flyer.row_of_log(task, flight.flight, flight.ending, flight.log)
-        if other := sorted(set(row.metrics) - set(schema.metrics)):
+        columns, run = self.manifest.table, as_whole_number(run, "run", 0, self.runs - 1)
+        row = self._flyer.row_of_log(Task(run, law), flight.flight, flight.ending, flight.log)
+        if other := sorted(set(row.metrics) - set(columns.metrics)):
             raise InputError(f"the flight has {other[0]}, which is no column of {self.folder}")
-        names = [name for name, _ in schema.columns()]
-        return pandas.DataFrame([list(schema.values(row))], columns=names)
+        return columns.table([row])
 
     @property
     def _flyer(self) -> RowFlyer:

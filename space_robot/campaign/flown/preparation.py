@@ -16,13 +16,11 @@ from ...flight.batch.compilation import compile_lanes
 from ...flight.compilation import compile_kernels
 from ...flight.plan import Flight
 from ...flight.simulate import simulate
-from ...processes.pool import run_many
+from ...processes.executor import run_many
 from ...processes.software import commit
-from ..row.bands import BINS
 from ..row.fly import RowFlyer
 from ..row.measure import check_requirements, planned, row_columns, row_metrics
-from ..store.manifest import Manifest
-from ..store.schema import Schema
+from ..store.manifest import Columns, Manifest
 from ..store.software import file_digests, flight_digest, software
 from ..study import Study
 
@@ -90,7 +88,7 @@ class Preparation:
             commit=commit(),
             files=file_digests(study),
             flights={law: flight_digest(flight) for law, flight in self.flights.items()},
-            table=self._schema(),
+            table=self._columns(),
         )
 
     @property
@@ -112,9 +110,7 @@ class Preparation:
             InputError: a function raised an error, returned no finite number or did not return.
         """
         law, where = self.study.laws[0], self.study.where
-        tried = run_many(
-            self._measure_nominal, [law], workers=min(workers, 1), timeout_s=timeout_s, attempts=1
-        )
+        tried = run_many(self._measure_nominal, [law], workers=min(workers, 1), timeout_s=timeout_s)
         with closing(tried):
             for done in tried:
                 if done.error is not None and not isinstance(done.error, InputError):
@@ -163,16 +159,15 @@ class Preparation:
         except InputError as error:
             raise InputError(f"{self.study.where}: metrics: {error}") from None
 
-    def _schema(self) -> Schema:
+    def _columns(self) -> Columns:
         nominal = next(iter(self.flights.values()))
         flight, draws = planned(nominal, self.study.pointing), self.flyer.draws
         first, own = draws.values(0), self.study.metrics
         metrics = row_metrics(flight, self.study.require.values())
-        return Schema(
+        return Columns(
             vary={n: "str" if isinstance(first[n], str) else "float64" for n in draws.names},
             grid=draws.grid,
             metrics=[*(name for name in metrics if name not in own), *own],
             require=list(self.study.require),
             bands=row_columns(flight),
-            bins=min(BINS, nominal.ticks),
         )

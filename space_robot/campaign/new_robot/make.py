@@ -32,7 +32,7 @@ from ...analysis.words import of_statistic
 from ...console.files import atomic_folder
 from ...flight.plan import Flight, Scenario, resolve
 from ...flight.simulate import simulate
-from ...processes.pool import cores, run_all
+from ...processes.executor import cores, run_all
 from ...tuning.gain_file import estimate_remark
 from ...tuning.task import AUTO, TuningOptions, force_demand
 from ..gain_set import tuned_set, write_set

@@ -17,7 +17,6 @@ from space_robot_msgs_py.errors import InputError
 
 from ...analysis.measure import Window, describe, label
 from ..flown import FlownCampaign
-from ..flown.current_table import recover_table
 from ..flown.flown_campaign import needs_trust
 from ..flown.precision import is_narrow
 from ..store.manifest import differences
@@ -106,7 +105,7 @@ class Findings:
     about: Mapping[str, str] = field(default_factory=dict)
     """Versions and digests, by name."""
     warnings: Sequence[str] = ()
-    """One line for each damaged file and each difference from the study that was flown."""
+    """One line for each difference from the study that was flown."""
     compared: Sequence[str] = ()
     """Names of the metrics to compare laws by; empty: the default ones."""
 
@@ -125,14 +124,10 @@ class Findings:
             InputError: the table cannot be read, is empty, or lacks a metric that is named.
         """
         manifest = campaign.manifest
-        try:
-            warnings = recover_table(campaign.folder, manifest, campaign.study)
-        except InputError as error:  # in use by another process, or read-only: used as it is
-            warnings = [str(error)]
+        warnings: list[str] = []
         table = campaign.table
         if table.empty:
-            lines = [f"{campaign.folder}: no flight has been flown yet", *warnings]
-            raise InputError("; ".join(lines))
+            raise InputError(f"{campaign.folder}: no flight has been flown yet")
         if study is not None:
             table = rejudged(study, table, campaign.study)
             warnings.append(f"The requirements are those of {study.where}.")

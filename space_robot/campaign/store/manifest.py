@@ -1,35 +1,70 @@
-"""Manifest of a campaign's folder: all that its rows depend on, so that rows are never mixed."""
+"""Manifest of a campaign: all that its rows depend on, so that rows are never mixed."""
 
 from __future__ import annotations
 
-import hashlib
-import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
-from typing import Annotated, Any, Final, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
+import numpy as np
 from pydantic import Field
 
-from space_robot_msgs_py.config.text import parse_json
-from space_robot_msgs_py.config.validation import StrictModel, short, validate
-from space_robot_msgs_py.config.yaml_text import read_file
+from space_robot_msgs_py.config.validation import StrictModel, short
 from space_robot_msgs_py.errors import InputError
 
-from ...console.files import atomic_file
+from ..row.row import Row
 from ..study import NOT_TO_BE_EXTENDED
-from .schema import Schema
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
 
 NEW_FOLDER = "choose another folder for this one"
-FORMAT: Final = 2
-"""Version of the folder's format; version 1 had neither digests nor the grid."""
-SHA256 = "sha256"
-"""Key of the digest of all other content of the file."""
+
+
+class Columns(StrictModel):
+    """The columns of a campaign's table, in order."""
+
+    vary: dict[str, Literal["float64", "str"]]
+    """Kind of each variable."""
+    grid: dict[str, int]
+    """Number of values of each grid variable."""
+    metrics: list[str]
+    require: list[str]
+    bands: list[str]
+
+    def table(self, rows: Iterable[Row]) -> DataFrame:
+        """Return rows as a data frame: missing numbers are NaN, missing bands None."""
+        import pandas
+
+        rows = list(rows)
+        table: dict[str, Any] = {
+            "run": np.array([row.task.run for row in rows], np.int64),
+            "law": [row.task.law for row in rows],
+            "outcome": [row.outcome for row in rows],
+            "reason": [row.reason for row in rows],
+            "ended_at_s": np.array([row.ended_at_s for row in rows], float),
+        }
+        for name, kind in self.vary.items():
+            values = [row.vary.get(name) for row in rows]
+            is_text = kind == "str"
+            table[f"vary.{name}"] = (
+                [None if value is None else str(value) for value in values]
+                if is_text
+                else np.array(values, float)
+            )
+        for name in self.metrics:
+            table[f"metric.{name}"] = np.array([row.metrics.get(name) for row in rows], float)
+        for name in self.require:
+            table[f"require.{name}"] = np.array([row.require.get(name) for row in rows], float)
+        for name in self.bands:
+            bands = [row.bands.get(name) for row in rows]
+            table[f"band.{name}"] = pandas.Series(bands, dtype=object)
+        return pandas.DataFrame(table | {"digest": [row.digest for row in rows]})
 
 
 class Manifest(StrictModel):
     """The campaign of a folder."""
 
-    format: Literal[2] = FORMAT
     seed: Annotated[int, Field(ge=0)]
     runs: Annotated[int, Field(ge=1)]
     """Number of runs to be flown."""
@@ -43,32 +78,7 @@ class Manifest(StrictModel):
     """Digests of the files that the campaign's file refers to, by name."""
     flights: dict[str, str]
     """Digest of the nominal flight of each law."""
-    table: Schema
-    """Columns of the table."""
-
-    @property
-    def laws(self) -> list[str]:
-        """Return the laws of the campaign, in order."""
-        return [str(law) for law in self.study["laws"]]
-
-    @property
-    def campaign(self) -> str:
-        """Return a digest of all that the rows depend on, without the number of runs."""
-        content = self.model_dump(exclude={"format", "commit", "runs"})
-        if self.study.get("design") in NOT_TO_BE_EXTENDED:
-            content["runs"] = self.runs
-        return _digest(content)
-
-    def write(self, path: Path) -> None:
-        """Write the manifest with its digest.
-
-        Raises:
-            InputError: the file cannot be written.
-        """
-        content = self.model_dump()
-        text = json.dumps({**content, SHA256: _digest(content)}, indent=1)
-        with atomic_file(path, replace=True) as file:
-            file.write(text.encode() + b"\n")
+    table: Columns
 
     def check_same(self, other: Manifest, where: Path) -> None:
         """Check that ``other`` is the same campaign, possibly with more runs.
@@ -93,54 +103,15 @@ class Manifest(StrictModel):
                     f"{where}: was started with another {what}: {key + ': ' if key else ''}"
                     f"{short(old)} then, {short(new)} now: {NEW_FOLDER}"
                 )
-        self._check_runs(other.runs, where)
-
-    def _check_runs(self, runs: int, where: Path) -> None:
-        if runs < self.runs:
-            raise InputError(
-                f"{where}: was started with {self.runs} runs, {runs} are requested: "
-                f"request {self.runs} or more, or {NEW_FOLDER}"
-            )
-        design = self.study.get("design")
-        if runs > self.runs and design in NOT_TO_BE_EXTENDED:
-            raise InputError(
-                f"{where}: was started with {self.runs} runs, {runs} are requested, and a "
-                f"{design} design cannot be extended: {NEW_FOLDER}"
-            )
-        if runs > self.runs and self.study.get("fixed_runs"):
-            raise InputError(
-                f"{where}: was started with {self.runs} runs, {runs} are requested, but its file "
-                f"has fixed_runs: true: {NEW_FOLDER}"
-            )
-
-
-def read_manifest(path: Path) -> Manifest:
-    """Read a manifest and check its digest.
-
-    Raises:
-        InputError: the file is missing, damaged, or of another version.
-    """
-    try:
-        content = parse_json(read_file(path))
-    except ValueError as error:
-        if isinstance(error, InputError):
-            raise
-        raise InputError(f"{path}: damaged: not JSON ({error})") from None
-    if not isinstance(content, dict):
-        raise InputError(f"{path}: damaged: a mapping was expected, got {short(content)}")
-    sha256 = content.pop(SHA256, None)
-    if content.get("format") == FORMAT - 1:
-        raise InputError(f"{path}: written by version 0.7 or older: use that one, or {NEW_FOLDER}")
-    if sha256 != _digest(content):
-        raise InputError(f"{path}: damaged or edited: its {SHA256} does not match its content")
-    manifest = validate(Manifest, content, str(path))
-    if not manifest.study.get("laws"):
-        raise InputError(f"{path}: study.laws: missing")
-    return manifest
-
-
-def _digest(content: Mapping[str, Any]) -> str:
-    return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
+        if other.runs == self.runs:
+            return
+        begun = f"{where}: was started with {self.runs} runs, {other.runs} are requested"
+        if other.runs < self.runs:
+            raise InputError(f"{begun}: request {self.runs} or more, or {NEW_FOLDER}")
+        if (design := self.study.get("design")) in NOT_TO_BE_EXTENDED:
+            raise InputError(f"{begun}, and a {design} design cannot be extended: {NEW_FOLDER}")
+        if self.study.get("fixed_runs"):
+            raise InputError(f"{begun}, but its file has fixed_runs: true: {NEW_FOLDER}")
 
 
 def differences(before: Any, now: Any, key: str = "") -> Iterator[tuple[str, Any, Any]]:

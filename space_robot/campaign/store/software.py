@@ -12,12 +12,10 @@ from typing import Any
 from space_robot_control.laws.names import law_file
 
 from ...flight.plan import Flight
-from ...processes.software import installed_version, versions
+from ...processes.software import versions
 
 DECIDE = ("python", "space_robot", "numpy", "scipy", "numba", "llvmlite")
 """Packages whose version may affect the bits of a row."""
-OF_TABLES = "pyarrow"
-"""The package that writes the table."""
 SUFFIXES = (".yaml", ".yml", ".urdf", ".xacro", ".py", ".csv", ".parquet")
 """Suffixes of files that a campaign's file may refer to."""
 ROOT = Path(__file__).resolve().parents[3]
@@ -26,10 +24,9 @@ ROOT = Path(__file__).resolve().parents[3]
 
 @cache
 def software() -> dict[str, str | None]:
-    """Return the version of each package that a table depends on, and a digest of the sources."""
+    """Return the version of each package that rows depend on, and a digest of the sources."""
     known = versions()
-    decisive = {name: known[name] for name in DECIDE}
-    return {**decisive, OF_TABLES: installed_version(OF_TABLES), "sources": source_digest(ROOT)}
+    return {**{name: known[name] for name in DECIDE}, "sources": source_digest(ROOT)}
 
 
 def file_digests(values: Any) -> dict[str, str]:

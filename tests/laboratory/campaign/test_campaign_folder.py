@@ -1,4 +1,4 @@
-"""A campaign's folder: journal, table and manifest; what somebody has changed in it is told."""
+"""A campaign's folder: rows and manifest; what somebody has changed in it is told."""
 
 from __future__ import annotations
 
@@ -8,22 +8,22 @@ import sys
 import warnings
 from collections.abc import Callable
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
+import pandas
 import pytest
 import yaml
+from hypothesis import given
+from hypothesis import strategies as st
 
 from space_robot.campaign.flown import Campaign, FlownCampaign
 from space_robot.campaign.report.findings import Findings
 from space_robot.campaign.row.row import Row, Task
-from space_robot.campaign.store.folder import begin_or_resume, held_folder
-from space_robot.campaign.store.journal import Journal
-from space_robot.campaign.store.journal_codec import JournalCodec
-from space_robot.campaign.store.journal_file import write_journal
-from space_robot.campaign.store.manifest import Manifest, read_manifest
-from space_robot.campaign.store.schema import Schema
+from space_robot.campaign.store.manifest import Columns, Manifest
 from space_robot.campaign.store.software import file_digests, source_digest
+from space_robot.campaign.store.store import CampaignStore, begin_or_resume, held_store
 from space_robot.campaign.study import Study
 from space_robot_control.laws.names import NotTrustedError
 from space_robot_msgs_py.errors import InputError
@@ -72,8 +72,8 @@ def copy(whole: Path, tmp_path: Path) -> Path:
 
 
 def test_the_study_that_was_flown_counts(copy: Path, reported: str) -> None:
-    text = (copy / "campaign.yaml").read_text()
-    (copy / "campaign.yaml").write_text(text.replace("1.0e-09", "1.0"))
+    text = (copy / "study.yaml").read_text()
+    (copy / "study.yaml").write_text(text.replace("1.0e-09", "1.0"))
     found, remarks = numbers(copy)
     assert found == reported
     assert "require.pointing.below: 1e-09 was flown, 1.0 is in the file now" in remarks[0]
@@ -137,11 +137,11 @@ def test_a_folder_imports_and_opens_nothing_unless_it_is_trusted(
             {"scenario": {"duration": 0.01, "events": [target]}},
         )
     ):
-        folder = tmp_path / str(number)
-        folder.mkdir()
+        folder = Path(shutil.copytree(whole, tmp_path / str(number)))
         study = Study.model_validate({**CONTENT, "require": {}, **other})
-        changed = read_manifest(whole / "campaign.json").model_copy(update={"study": study.content})
-        changed.write(folder / "campaign.json")
+        changed = FlownCampaign.open(whole).manifest.model_copy(update={"study": study.content})
+        with held_store(folder) as store:
+            store.write_manifest(changed)
         with pytest.raises(NotTrustedError, match=r"only with --trust|--trust imports a"):
             FlownCampaign.open(folder).rerun(0)
     assert "law_of_somebody" not in sys.modules
@@ -155,13 +155,8 @@ def test_a_folder_imports_and_opens_nothing_unless_it_is_trusted(
 
 BOTH = ["tde_stc", "ctc=tuned"]
 
-SCHEMA = Schema(
-    grid={},
-    vary={"mass": "float64", "word": "str"},
-    metrics=["m"],
-    require=["r"],
-    bands=["s"],
-    bins=3,
+COLUMNS = Columns(
+    grid={}, vary={"mass": "float64", "word": "str"}, metrics=["m"], require=["r"], bands=["s"]
 )
 
 
@@ -179,16 +174,57 @@ def test_any_change_of_any_source_changes_the_digest_of_the_software(tmp_path: P
 
 
 def test_a_full_disk_is_told_in_a_line(tmp_path: Path) -> None:
-    codec = JournalCodec("campaign", BOTH)
-    write_journal(tmp_path / "journal.db", codec, [])
-    with Journal(tmp_path / "journal.db", codec) as journal:
-        journal.add(Row(Task(0, "tde_stc"), "complete"))
-        pages = journal._database.execute("PRAGMA page_count").fetchone()[0]
-        journal._database.execute(f"PRAGMA max_page_count = {pages}")
+    with CampaignStore(tmp_path / "campaign.sqlite", is_read_only=False) as store:
+        store.add(Row(Task(0, "tde_stc"), "complete"))
+        pages = store._database.execute("PRAGMA page_count").fetchone()[0]
+        store._database.execute(f"PRAGMA max_page_count = {pages}")
         band = {"s": np.zeros(9999, np.float32)}
         with pytest.raises(InputError, match=r"database or disk is full; the same command"):
-            journal.add(Row(Task(1, "tde_stc"), "complete", bands=band))
-        assert [row.task.run for row in journal.rows(9)] == [0]
+            store.add(Row(Task(1, "tde_stc"), "complete", bands=band))
+        assert [row.task.run for row in store.rows()] == [0]
+
+
+@given(
+    st.dictionaries(st.sampled_from("abc"), st.floats()),
+    st.dictionaries(st.text(max_size=3), st.lists(st.floats(width=32), max_size=3), max_size=3),
+)
+def test_every_bit_comes_back(
+    numbers_by_name: dict[str, float], bands: dict[str, list[float]]
+) -> None:
+    values = {name: np.array(band, np.float32) for name, band in bands.items()}
+    row = Row(Task(3, "ctc"), "complete", "", 0.1, numbers_by_name, numbers_by_name, {}, values)
+    with TemporaryDirectory() as folder, held_store(Path(folder)) as store:
+        store.add(row)
+        (stored,) = store.rows()
+    assert repr(dict(stored.metrics)) == repr(numbers_by_name)
+    assert {n: b.tobytes() for n, b in stored.bands.items()} == {
+        n: b.tobytes() for n, b in values.items()
+    }
+
+
+@pytest.mark.parametrize("is_cut", [False, True])
+def test_damage_is_told_in_a_line(copy: Path, is_cut: bool) -> None:
+    file = copy / "campaign.sqlite"
+    data = file.read_bytes()
+    file.write_bytes(data[: len(data) // 2] if is_cut else b"x" * 100 + data[100:])
+    with pytest.raises(InputError, match=r"campaign\.sqlite: damaged: [^\n]+$"):
+        assert len(FlownCampaign.open(copy).table)
+    with pytest.raises(InputError, match=r"campaign\.sqlite: damaged: [^\n]+$"):
+        run(copy)
+
+
+def test_an_export_has_every_number(whole: Path, tmp_path: Path) -> None:
+    flown = FlownCampaign.open(whole)
+    for suffix in ("csv", "parquet"):
+        flown.export(tmp_path / f"table.{suffix}")
+    same = pandas.read_csv(tmp_path / "table.csv", float_precision="round_trip")
+    numbers_only = [name for name in same if str(name).startswith(("vary.", "metric."))]
+    assert same[numbers_only].equals(flown.table[numbers_only])
+    again = pandas.read_parquet(tmp_path / "table.parquet")
+    assert again["metric.attitude.max"].equals(flown.table["metric.attitude.max"])
+    assert (again["band.attitude"][0] == flown.table["band.attitude"][0]).all()
+    with pytest.raises(InputError, match="suffix"):
+        flown.export(tmp_path / "table.xlsx")
 
 
 def content_of(study: dict[str, object]) -> dict[str, object]:
@@ -204,7 +240,7 @@ def manifest(**other: object) -> Manifest:
         "commit": None,
         "files": {},
         "flights": {"tde_stc": "f"},
-        "table": SCHEMA.model_dump(),
+        "table": COLUMNS.model_dump(),
     }
     return Manifest.model_validate({**content, **other})
 
@@ -233,14 +269,14 @@ def test_another_campaign_is_refused_in_a_line(
     tmp_path: Path, first: dict[str, object], other: dict[str, object], said: str
 ) -> None:
     folder, begun = tmp_path / "a", manifest(**first)
-    with held_folder(folder):
+    with held_store(folder) as store:
         for _ in range(2):
-            assert not begin_or_resume(folder, begun, yaml.safe_dump(begun.study))
+            assert not begin_or_resume(store, begun, yaml.safe_dump(begun.study))
         with pytest.raises(InputError) as refused:
-            begin_or_resume(folder, manifest(**other), "")
+            begin_or_resume(store, manifest(**other), "")
+        assert store.manifest == begun
     assert said in str(refused.value)
     assert "\n" not in str(refused.value)
-    assert read_manifest(folder / "campaign.json") == begun
 
 
 def test_one_process_at_a_time(tmp_path: Path) -> None:
@@ -249,12 +285,12 @@ def test_one_process_at_a_time(tmp_path: Path) -> None:
 
     def hold() -> None:
         try:
-            with held_folder(tmp_path):
+            with held_store(tmp_path):
                 theirs.send("held")
         except InputError as error:
             theirs.send(str(error))
 
-    with held_folder(tmp_path):
+    with held_store(tmp_path):
         context.Process(target=hold).start()
         assert "another process is flying this campaign" in ours.recv()
     context.Process(target=hold).start()
@@ -264,7 +300,7 @@ def test_one_process_at_a_time(tmp_path: Path) -> None:
 def test_a_folder_of_something_else_is_left_alone(tmp_path: Path) -> None:
     (tmp_path / "thesis.tex").write_text("x")
     said = r"contains thesis\.tex and no "
-    with pytest.raises(InputError, match=said), held_folder(tmp_path):
+    with pytest.raises(InputError, match=said), held_store(tmp_path):
         pass
     assert [path.name for path in tmp_path.iterdir()] == ["thesis.tex"]
 

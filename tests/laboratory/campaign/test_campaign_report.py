@@ -6,6 +6,7 @@ import json
 import os
 import re
 import shlex
+import shutil
 import signal
 import subprocess
 import sys
@@ -26,8 +27,7 @@ from space_robot.campaign.report.documents import print_report, record, render
 from space_robot.campaign.report.figures import bands
 from space_robot.campaign.report.findings import Findings, Quantity
 from space_robot.campaign.report.tables import demand_text, number, verdict_table
-from space_robot.campaign.store.manifest import read_manifest
-from space_robot.campaign.store.table import table_rows, write_table
+from space_robot.campaign.store.store import held_store
 from space_robot.campaign.study import Requirement, Study
 from space_robot.campaign.verdicts.laws import league
 from space_robot.cli.campaign import name_of
@@ -247,14 +247,12 @@ def test_rerun_says_that_the_digest_is_the_same_or_fails(flown: Path, tmp_path: 
     assert again.exit_code == 0, again.output
     assert json.loads(again.stdout)["campaign"]["same"]
     assert (tmp_path / "bag/metadata.yaml").is_file()
-    manifest = read_manifest(flown / "campaign.json")
-    rows = table_rows(flown / "table.parquet", manifest.table)
+    other = Path(shutil.copytree(flown, tmp_path / "other"))
+    manifest = FlownCampaign.open(flown).manifest
     software = {**manifest.software, "numpy": "0.1"}
-    manifest = manifest.model_copy(update={"seed": manifest.seed + 1, "software": software})
-    other = tmp_path / "other"
-    other.mkdir()
-    manifest.write(other / "campaign.json")
-    write_table(other / "table.parquet", manifest.table, manifest.campaign, rows)
+    with held_store(other) as store:
+        seed = manifest.seed + 1
+        store.write_manifest(manifest.model_copy(update={"seed": seed, "software": software}))
     reruns = (campaign("rerun", other, run) for run in range(4))
     differing = next(result for result in reruns if result.exit_code == 1)
     assert "differs from the row's" in differing.stderr
@@ -267,8 +265,8 @@ def test_who_ends_it_is_told_how_to_go_on(file: Path, tmp_path: Path) -> None:
     process = subprocess.Popen(
         command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True
     )
-    journal = tmp_path / "a/journal.db-wal"
-    while process.poll() is None and not (journal.exists() and journal.stat().st_size > 100_000):
+    log = tmp_path / "a/campaign.sqlite-wal"
+    while process.poll() is None and not (log.exists() and log.stat().st_size > 100_000):
         time.sleep(0.02)
     os.killpg(process.pid, signal.SIGINT)  # as the terminal does
     stdout, stderr = process.communicate(timeout=120)

@@ -88,7 +88,7 @@ def test_a_file_becomes_a_folder_that_flies(tmp_path: Path) -> None:
     flown = run("campaign", "run", "mine/campaign.yaml", "--runs", "2", "--workers", "0")
     assert flown.exit_code == 0, flown.exception
     assert "pointing" in flown.stdout
-    assert (tmp_path / "campaigns/mine/table.parquet").is_file()
+    assert (tmp_path / "campaigns/mine/campaign.sqlite").is_file()
     assert isinstance(new(FILE, "--out", "mine").exception, InputError), "it is there"
 
 
