@@ -23,7 +23,7 @@ from ..console.files import csv_writer
 from ..console.tables import as_markdown
 from ..flight.flown_log import empty_log
 from ..flight.plan import Flight, Scenario, resolve
-from ..processes.pool import run_all
+from ..processes.executor import run_all
 from ..processes.software import commit, versions
 from .comparison import Cell, cells, chatter, chatter_table, claims, claims_table, variant_tables
 from .flights import PERFECT, ROBOT, Equipment, Result, TableRow, Variant, fly, plan

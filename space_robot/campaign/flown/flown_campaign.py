@@ -133,7 +133,7 @@ class FlownCampaign:
             import pyarrow  # noqa: F401
         except ImportError:
             raise InputError(f"{file}: needs pyarrow: {install_command('parquet')}") from None
-        with whole_file(file) as opened:
+        with atomic_file(file) as opened:
             table.to_parquet(opened, engine="pyarrow", index=False)
 
     @cached_property

@@ -17,7 +17,7 @@ from typing_extensions import Self
 from space_robot_msgs_py.config.validation import short
 from space_robot_msgs_py.errors import InputError
 
-from ...console.files import make_folder, whole_file
+from ...console.files import atomic_file, make_folder
 from ..row.row import Row, Task
 from ..study import read_study
 from .manifest import NEW_FOLDER, Manifest, differences
@@ -205,7 +205,7 @@ def begin_or_resume(store: CampaignStore, manifest: Manifest, study_text: str) -
         before.check_same(manifest, store.path.parent)
         changes = study_changes(study, manifest.study) if study.exists() else ""
     if before is None or not study.exists():
-        with whole_file(study, replace=True) as file:
+        with atomic_file(study, replace=True) as file:
             file.write(study_text.encode())
     store.write_manifest(manifest)
     return changes
