@@ -1,4 +1,8 @@
-"""Designs of experiments: the uniform random numbers of a campaign's runs."""
+"""Designs of experiments: the uniform random numbers of a campaign's runs.
+
+Each number depends only on the campaign's seed, a name and a number: not on the process, on the
+order of the draws, or on other draws.
+"""
 
 from __future__ import annotations
 
@@ -6,6 +10,7 @@ import warnings
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from functools import lru_cache
+from hashlib import blake2b
 from typing import ClassVar, NamedTuple
 
 import numpy as np
@@ -13,11 +18,41 @@ from numpy.typing import NDArray
 
 from space_robot_msgs_py.errors import InputError
 
-from . import keys
-
+_PERSON = b"space_robot"
+BITS = 52
+"""Random bits of a number from `uniform`."""
 SOBOL_BITS = 30
 _BLOCK = 1024
 """Points of Sobol's sequence that are computed at a time."""
+
+
+def bits(seed: int, name: str, number: int) -> int:
+    """Return 64 random bits: the BLAKE2 hash of the arguments."""
+    text = f"{seed}:{number}:{name}".encode()
+    return int.from_bytes(blake2b(text, digest_size=8, person=_PERSON).digest(), "little")
+
+
+def uniform(seed: int, name: str, number: int) -> float:
+    """Return a uniform random number in the open interval (0, 1)."""
+    return unit(bits(seed, name, number) >> (64 - BITS))
+
+
+def unit(integer: int) -> float:
+    """Return ``(integer + 0.5) / 2**BITS``, the centre of an interval of (0, 1)."""
+    return (integer + 0.5) * 2.0**-BITS
+
+
+def noise_seed(seed: int, number: int) -> int:
+    """Return the 31-bit seed of the noise of sensors and faults in a draw."""
+    return bits(seed, "seed", number) >> 33
+
+
+@lru_cache(maxsize=256)
+def permutation(seed: int, name: str, length: int) -> NDArray[np.int64]:
+    """Return the numbers 0 to ``length`` - 1 in random order."""
+    key = bits(seed, f"{name}:permutation", 0)
+    raw = np.random.Philox(key=key).random_raw(length)  # counter-based: the same bits everywhere
+    return np.argsort(raw, kind="stable")
 
 
 class DesignPoint(NamedTuple):
@@ -60,7 +95,7 @@ class Independent(Design):
 
     def uniform(self, place: DesignPoint, name: str, number: int) -> float:
         """Return the uniform number of a variable for a draw."""
-        return keys.uniform(self.seed, name, place.draw)
+        return uniform(self.seed, name, place.draw)
 
 
 class LatinHypercube(Design):
@@ -70,8 +105,8 @@ class LatinHypercube(Design):
 
     def uniform(self, place: DesignPoint, name: str, number: int) -> float:
         """Return the uniform number of a variable for a draw."""
-        stratum = keys.permutation(self.seed, name, self.draws)[place.draw]
-        inside = keys.uniform(self.seed, name, place.draw)
+        stratum = permutation(self.seed, name, self.draws)[place.draw]
+        inside = uniform(self.seed, name, place.draw)
         return min((int(stratum) + inside) / self.draws, 1.0 - 2.0**-53)
 
 
@@ -109,10 +144,10 @@ def shifted(seed: int, name: str, index: int, dimension: int) -> float:
     """Return a number of Sobol's sequence with a digital shift derived from ``name``."""
     if dimension >= 21_201:
         raise InputError("a Sobol sequence has 21201 dimensions at most")
-    shift = keys.bits(seed, f"{name}:shift", 0) >> (64 - keys.BITS)
+    shift = bits(seed, f"{name}:shift", 0) >> (64 - BITS)
     block = _sobol_block(_dimensions(dimension), index // _BLOCK)
-    own = int(block[index % _BLOCK, dimension]) << (keys.BITS - SOBOL_BITS)
-    return keys.unit(own ^ shift)
+    own = int(block[index % _BLOCK, dimension]) << (BITS - SOBOL_BITS)
+    return unit(own ^ shift)
 
 
 def _dimensions(dimension: int) -> int:

@@ -7,7 +7,14 @@ from abc import abstractmethod
 from functools import cached_property
 from typing import Annotated, Any, ClassVar
 
-from pydantic import Field, ValidationInfo, field_validator, model_validator
+from pydantic import (
+    AfterValidator,
+    Field,
+    ValidationError,
+    ValidationInfo,
+    field_validator,
+    model_validator,
+)
 from typing_extensions import Self
 
 from space_robot_model.elementary.functions import exp, log
@@ -18,7 +25,15 @@ from space_robot_msgs_py.errors import InputError
 
 Value = float | int | str | bool
 """A drawn value; integers occur only in lists of values."""
-Pair = Annotated[list[float], Field(min_length=2, max_length=2)]
+
+
+def _rising(bounds: list[float]) -> list[float]:
+    if not bounds[0] < bounds[1]:
+        raise ValueError("a lower bound and a higher one were expected, in this order")
+    return bounds
+
+
+Bounds = Annotated[list[float], Field(min_length=2, max_length=2), AfterValidator(_rising)]
 Values = Annotated[list[bool | int | float | str], Field(min_length=1, max_length=100_000)]
 
 
@@ -61,14 +76,18 @@ class Distribution(StrictModel):
             return nominal * float(drawn)
         return nominal + float(drawn) if self.offset else drawn
 
-    def at_least(self, low: float) -> Distribution:
-        """Return the distribution with no value below ``low``; a normal one is truncated there.
+    def at_least(self, factor: float, nominal: float) -> Distribution:
+        """Return the distribution with results of at least ``factor`` times the nominal value.
 
         Raises:
-            InputError: a distribution other than normal has values below ``low``.
+            InputError: it has smaller results, and is not normal; a normal one is truncated.
         """
-        if min(float(value) for value in self.ends) < low:
-            raise InputError(f"can be {min(map(float, self.ends)):g}: must be {low:g} or more")
+        low = factor if self.relative else (factor - self.offset) * nominal
+        return self._truncated(low)
+
+    def _truncated(self, low: float) -> Distribution:
+        if (least := min(float(value) for value in self.ends)) < low:
+            raise InputError(f"can be {least:g}: must be {low:g} or more")
         return self
 
 
@@ -105,22 +124,19 @@ class Normal(Distribution):
         value = value if self.low is None else max(value, self.low)
         return value if self.high is None else min(value, self.high)
 
-    def at_least(self, low: float) -> Normal:
-        """Truncate the distribution below ``low``."""
+    def _truncated(self, low: float) -> Normal:
         if self.low is not None and self.low >= low:
             return self
-        return type(self).model_validate({**self.model_dump(), "low": low})
+        try:
+            return type(self).model_validate({**self.model_dump(), "low": low})
+        except ValidationError:
+            raise InputError(f"no values left: must be {low:g} or more") from None
 
 
 class Uniform(Distribution):
     """Uniform distribution between two values."""
 
-    uniform: Pair
-
-    @field_validator("uniform", mode="after")
-    @classmethod
-    def _rise(cls, ends: list[float]) -> list[float]:
-        return _rising(ends)
+    uniform: Bounds
 
     def quantile(self, u: float) -> float:
         """Return the quantile of probability ``u``."""
@@ -131,14 +147,14 @@ class Uniform(Distribution):
 class LogUniform(Distribution):
     """Uniform distribution of the logarithm."""
 
-    log_uniform: Pair
+    log_uniform: Bounds
 
     @field_validator("log_uniform", mode="after")
     @classmethod
-    def _rise(cls, ends: list[float]) -> list[float]:
-        if not ends[0] > 0.0:
+    def _is_positive(cls, bounds: list[float]) -> list[float]:
+        if not bounds[0] > 0.0:
             raise ValueError("numbers above 0 were expected")
-        return _rising(ends)
+        return bounds
 
     @cached_property
     def _span(self) -> float:
@@ -163,7 +179,7 @@ class Categorical(Distribution):
 
     @property
     def ends(self) -> list[Value]:
-        """Return the least and the largest value."""
+        """Return all values."""
         return list(dict.fromkeys(self.values))
 
     @model_validator(mode="after")
@@ -250,9 +266,3 @@ def read_distribution(value: Any, where: str) -> Distribution:
         f"{where}: a distribution was expected, a mapping with one of {', '.join(KINDS)}, "
         f"got {short(value)}" + (f" (did you mean {near}?)" if near else "")
     )
-
-
-def _rising(ends: list[float]) -> list[float]:
-    if not ends[0] < ends[1]:
-        raise ValueError("a lower bound and a higher one were expected, in this order")
-    return ends

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator
+from functools import lru_cache
 from typing import Any
 
 from space_robot_msgs_py.errors import InputError
@@ -12,16 +13,18 @@ from space_robot_msgs_py.errors import InputError
 from ...api import Scenario
 from ...flight.plan import Flight
 from ..study import Law, Study
-from .changes import Changes, Nominal
-from .designs import DESIGNS, Blocks, Design, DesignPoint, Saltelli
+from .designs import DESIGNS, Blocks, Design, DesignPoint, Saltelli, noise_seed
 from .distributions import Grid, Value
-from .keys import noise_seed
-from .setting_variables import OfScenario
-from .variable import Variable
-from .variables import told_at, variables_of
+from .nominal import Nominal, Variation
+from .paths import Path, value_at
+from .variables import Variable, errors_at, read_variables
 
 MOST_NOMINALS = 64
 """Size of the cache of nominal flights, used where options of the scenario are varied."""
+MOST_RUNS_KEPT = 256
+"""Size of the cache of drawn values: several laws fly each run, and rows hold the values."""
+
+Drawn = Iterable[tuple[Variable, Value]]
 
 
 class Draws:
@@ -41,21 +44,28 @@ class Draws:
         """
         self.study, self.seed, self.runs = study, seed, runs
         self._nominals: dict[tuple[str, str], Nominal] = {}
-        nominals = [self._nominal(law, {}) for law in study.laws]
-        self._variables = variables_of(study, nominals)
-        self._grids = [v for v in self._variables if isinstance(v.distribution, Grid)]
-        self._drawn = [v for v in self._variables if not isinstance(v.distribution, Grid)]
+        nominals = []
+        for law in study.laws:
+            with errors_at(f"{study.where}: law {law}"):
+                nominals.append(self._nominal(law))
+        self._variables = read_variables(study, nominals)
         self.names = [variable.name for variable in self._variables]
         """Names of all variables, in the file's order."""
-        self._points = math.prod(len(_values(v)) for v in self._grids)
+        self._grids = {
+            variable.name: variable.distribution.grid
+            for variable in self._variables
+            if isinstance(variable.distribution, Grid)
+        }
+        self._points = math.prod(map(len, self._grids.values()))
         self._design = self._made_design()
+        self._drawn = lru_cache(MOST_RUNS_KEPT)(self._draw)
         if check:
-            self._check()
+            self._check_ends()
 
     @property
     def grid(self) -> dict[str, int]:
         """Number of values of each grid variable, by name."""
-        return {variable.name: len(_values(variable)) for variable in self._grids}
+        return {name: len(values) for name, values in self._grids.items()}
 
     @property
     def blocks(self) -> Blocks | None:
@@ -74,7 +84,7 @@ class Draws:
 
         They are factors of variables with ``relative``, and differences of those with ``offset``.
         """
-        return {name: _told(value) for name, value in zip(self.names, self._raw(run), strict=True)}
+        return {variable.name: _told(value) for variable, value in self._drawn(run)}
 
     def scenario(self, run: int, law: str) -> Scenario:
         """Return the scenario of a law in a run; the plant's noise is the same for all laws.
@@ -82,7 +92,8 @@ class Draws:
         Raises:
             InputError: there is no such run, or its values cannot be flown together.
         """
-        return self._drawn_changes(run, law).scenario(seed=self._noise_seed(run))
+        nominal, variation = self._varied(law, self._drawn(run), self._noise_seed(run))
+        return nominal.scenario_of(variation)
 
     def flight(self, run: int, law: str) -> Flight:
         """Return the checked flight of `scenario`; files are read once a law, not once a run.
@@ -90,7 +101,25 @@ class Draws:
         Raises:
             InputError: as there, or it cannot be flown.
         """
-        return self._drawn_changes(run, law).flight(self._noise_seed(run))
+        nominal, variation = self._varied(law, self._drawn(run), self._noise_seed(run))
+        return nominal.flight_of(variation)
+
+    def nominal(self, law: str) -> Scenario:
+        """Return the nominal scenario of a law."""
+        return self._nominal(law).scenario
+
+    def flights_of_options(self) -> Iterator[tuple[str, Flight]]:
+        """Yield a description and the flight of each extreme value of each varied option."""
+        for variable in self._variables:
+            if variable.group == "scenario":
+                for value in variable.distribution.ends:
+                    flight = self._extreme(self.study.laws[0], variable, value).check()
+                    yield f"{variable.name}: {_shown(value)}", flight
+
+    def _place(self, run: int) -> DesignPoint:
+        if not 0 <= run < self.runs:
+            raise InputError(f"run {run}: this campaign has runs 0 to {self.runs - 1}")
+        return DesignPoint(*divmod(run, self._points))
 
     def _noise_seed(self, run: int) -> int:
         place = self._place(run)
@@ -98,55 +127,46 @@ class Draws:
         of_b = isinstance(self._design, Saltelli) and place.point > len(self.names)
         return noise_seed(self.seed, 2 * place.draw + of_b)
 
-    def _drawn_changes(self, run: int, law: str) -> Changes:
-        return self._changes(law, list(zip(self._variables, self._raw(run), strict=True)))
-
-    def nominal(self, law: str) -> Scenario:
-        """Return the nominal scenario of a law."""
-        return self._nominal(law, {}).scenario
-
-    def flights_of_options(self) -> Iterator[tuple[str, Flight]]:
-        """Yield a description and the flight of each extreme value of each varied option."""
-        for variable in self._variables:
-            if isinstance(variable, OfScenario):
-                for value in variable.distribution.ends:
-                    changes = self._changes(self.study.laws[0], [(variable, value)])
-                    yield f"{variable.name}: {_shown(value)}", changes.scenario().check()
-
-    def _place(self, run: int) -> DesignPoint:
-        if not 0 <= run < self.runs:
-            raise InputError(f"run {run}: this campaign has runs 0 to {self.runs - 1}")
-        return DesignPoint(*divmod(run, self._points))
-
-    def _raw(self, run: int) -> list[Value]:
+    def _draw(self, run: int) -> list[tuple[Variable, Value]]:
         place = self._place(run)
-        point, of_grid = place.point, {}
-        for variable in reversed(self._grids):
-            values = _values(variable)
+        point, on_grid = place.point, {}
+        for name, values in reversed(self._grids.items()):
             point, index = divmod(point, len(values))
-            of_grid[variable.name] = values[index]
+            on_grid[name] = values[index]
         numbers = itertools.count()
         return [
-            of_grid[v.name]
-            if v.name in of_grid
-            else v.distribution.quantile(self._design.uniform(place, v.name, next(numbers)))
-            for v in self._variables
+            (
+                own,
+                on_grid[own.name]
+                if own.name in on_grid
+                else own.distribution.quantile(
+                    self._design.uniform(place, own.name, next(numbers))
+                ),
+            )
+            for own in self._variables
         ]
 
-    def _changes(self, law: str, drawn: Sequence[tuple[Variable, Value]]) -> Changes:
-        changes = Changes(self._nominal(law, {}))
+    def _varied(self, law: str, drawn: Drawn, seed: int) -> tuple[Nominal, Variation]:
+        """Return the nominal flight with drawn options, and what the other values change in it."""
+        nominal, options = self._nominal(law), {}
         for variable, value in drawn:
-            if isinstance(variable, OfScenario):
-                variable.apply(value, changes)
-        if changes.options and len(changes.options) < len(drawn):
-            changes = changes.on(self._nominal(law, changes.options))
+            if variable.group == "scenario":
+                path = variable.paths[0]
+                options[path[1]] = variable.distribution.on(value_at(nominal.tree, path), value)
+        if options:
+            nominal = self._nominal(law, options)
+        changed: dict[Path, Any] = {}
         for variable, value in drawn:
-            if not isinstance(variable, OfScenario):
-                variable.apply(value, changes)
-        return changes
+            for path in variable.paths if variable.group != "scenario" else ():
+                now = changed[path] if path in changed else value_at(nominal.tree, path)
+                if now is None and variable.group == "gains":  # of other laws
+                    continue
+                changed[path] = variable.distribution.on(now, value)
+        return nominal, nominal.variation(changed, seed)
 
-    def _nominal(self, law: str, options: dict[str, Any]) -> Nominal:
+    def _nominal(self, law: str, options: dict[str, Any] | None = None) -> Nominal:
         """Return the nominal flight of a law with some options drawn."""
+        options = options or {}
         key = law, repr(sorted(options.items()))
         if key not in self._nominals:
             if len(self._nominals) >= MOST_NOMINALS:
@@ -154,10 +174,7 @@ class Draws:
             merged, (controller, gains) = {**self.study.scenario, **options}, Law.parse(law)
             if "=" in law:
                 merged["gains"] = gains
-            try:
-                self._nominals[key] = Nominal.of(Scenario(**merged, controller=controller))
-            except InputError as error:
-                raise InputError(f"{self.study.where}: law {law}: {error}") from None
+            self._nominals[key] = Nominal(Scenario(**merged, controller=controller))
         return self._nominals[key]
 
     def _made_design(self) -> Design:
@@ -185,22 +202,22 @@ class Draws:
             return Saltelli(self.seed, draws, len(self.names))
         return kind(self.seed, draws)
 
-    def _check(self) -> None:
+    def _check_ends(self) -> None:
         """Check that the extreme values of each variable can be flown."""
         for variable in self._variables:
-            if variable.is_of_plant_robot:
+            if variable.is_always_consistent:
                 continue
             where = f"{self.study.where}: vary.{variable.key}"
-            for law in self.study.laws if variable.is_of_law else self.study.laws[:1]:
+            of_law = variable.group in ("controller", "gains")
+            for law in self.study.laws if of_law else self.study.laws[:1]:
                 for value in variable.distribution.ends:
-                    with told_at(f"{where}: {variable.name} can be {_shown(value)}"):
-                        self._changes(law, [(variable, value)]).scenario().check()
+                    with errors_at(f"{where}: {variable.name} can be {_shown(value)}"):
+                        self._extreme(law, variable, value).check()
 
-
-def _values(variable: Variable) -> list[Any]:
-    grid = variable.distribution
-    assert isinstance(grid, Grid)
-    return grid.grid
+    def _extreme(self, law: str, variable: Variable, value: Value) -> Scenario:
+        seed = self._nominal(law).scenario.seed
+        nominal, variation = self._varied(law, [(variable, value)], seed)
+        return nominal.scenario_of(variation)
 
 
 def _told(value: Value) -> float | str:

@@ -1,85 +1,184 @@
-"""The variables of a campaign's file."""
+"""The variables of a campaign's file: paths, and the distributions of the numbers there."""
 
 from __future__ import annotations
 
 import re
-from collections import Counter
-from collections.abc import Hashable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any, NamedTuple
 
-from space_robot_msgs_py.config.validation import one_of, short
+from pydantic import Field
+
+from space_robot_msgs_py.config.files import Tree
+from space_robot_msgs_py.config.validation import StrictModel, one_of, short, validate
 from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.samples import RobotNames
 from space_robot_sim.faults.grammar import About, Kind, axes_of
 from space_robot_sim.plant.settings import PLANT_KINDS
 
 from ..study import Study
-from .changes import Changes, Nominal
-from .distributions import Value, read_distribution
-from .names import parts_of
-from .robot_variables import InertiaScale, robot_variables
-from .setting_variables import gain_variables, node_variables, option_variables
-from .variable import Variable
+from .distributions import Distribution, Normal, read_distribution
+from .nominal import Nominal
+from .paths import Path, matches, value_at
+from .robot_numbers import ROTATIONS, SCALES, is_always_consistent, least_factor
 
 FAULTS = "faults"
-NODES = ("plant", "controller", "mission")
-GROUPS = ("robot", "scenario", *NODES, "gains", FAULTS)
-
-
-EACH = ":[*]"
+START = ("mission", "start_deg")
+EACH_OF_FAULT = ":[*]"
 """End of a fault's text: one variable for each axis, wheel or thruster."""
 _TIME = re.compile(r"(?<=@)T(?=$|:)")
 
 
-@dataclass(frozen=True)
-class OfFault(Variable):
-    """A fault; ``{}`` in its text stands for the drawn number."""
+class Variable(NamedTuple):
+    """A random number of a campaign, and the leaves of the scenario that it changes."""
 
-    text: str
+    name: str
+    """With the name of the element, such as ``robot.links[joint1].mass``."""
+    key: str
+    """Key of ``vary`` in the file."""
+    distribution: Distribution
+    paths: tuple[Path, ...]
+    """Of a fault: ``faults`` and its text, in which ``{}`` stands for the number."""
 
     @property
-    def place(self) -> Hashable:
-        """Return the key of the changed quantity."""
-        return "fault", self.text
+    def group(self) -> str:
+        """First key of its paths."""
+        return self.paths[0][0]
 
-    def apply(self, value: Value, changes: Changes) -> None:
-        """Apply a value of the variable to a flight."""
-        changes.faults.append(self.text.replace("{}", _written(value)))
+    @property
+    def is_always_consistent(self) -> bool:
+        """True if every value can be flown."""
+        return self.group == "robot" and is_always_consistent(self.paths[0][1:])
 
 
-def fault_variables(key: str, value: Any, where: str, names: RobotNames) -> list[Variable]:
-    """Return the variables of a fault.
+class InertiaSpread(StrictModel):
+    """Entry ``{scale: 0.1, rotate_deg: 3}`` of an inertia."""
+
+    scale: Annotated[float, Field(gt=0.0, le=1.0)] | None = None
+    """Standard deviation of the logarithms of the second moments' factors."""
+    rotate_deg: Annotated[float, Field(gt=0.0, le=30.0)] | None = None
+    """Standard deviation of the rotation about each axis, degrees."""
+
+
+@contextmanager
+def errors_at(where: str) -> Iterator[None]:
+    """Prefix errors with file and key."""
+    try:
+        yield
+    except InputError as error:
+        text = str(error)
+        raise InputError(text if text.startswith(where) else f"{where}: {text}") from None
+
+
+def read_variables(study: Study, nominals: Sequence[Nominal]) -> list[Variable]:
+    """Return all variables, in the file's order; ``[*]`` gives one variable for each element.
 
     Args:
-        key: the fault's text without its last number, or with ``T`` as its time.
-        value: the distribution.
-        where: file and key, for errors.
-        names: of axes, wheels and thrusters.
+        study: the file.
+        nominals: the nominal flight of each law.
 
     Raises:
-        InputError: there is no such fault, or it has no number.
+        InputError: names the key of ``vary`` that is wrong.
     """
-    kind = PLANT_KINDS[
-        one_of(key.partition("@")[0], PLANT_KINDS, "kind of fault", listing="--fault list")
-    ]
-    distribution = read_distribution(value, where)
+    gains = {gain: own for nominal in nominals[::-1] for gain, own in nominal.tree["gains"].items()}
+    tree = {**nominals[0].tree, "gains": gains, FAULTS: {}}
+    variables: list[Variable] = []
+    for key, value in study.vary.items():
+        where = f"{study.where}: vary.{key}"
+        with errors_at(where):
+            if key == FAULTS:
+                variables += _all_faults(value, where, nominals[0].names)
+            else:
+                variables += _variables(tree, key, value, where)
+    _check_overlaps(study, variables)
+    return variables
+
+
+def _variables(tree: Tree, key: str, value: Any, where: str) -> Iterator[Variable]:
+    is_spread = isinstance(value, dict) and bool({"scale", "rotate_deg"} & value.keys())
+    for name, paths in matches(tree, key).items():
+        if paths[0][:2] == START:  # where the plant begins is a parameter of the plant
+            number = 1 + list(tree["mission"]["start_deg"]).index(paths[0][-1])
+            paths = [("plant", "initial_joints_deg", str(number))]
+        if is_spread and paths[0][0] == "robot" and paths[0][-1] == "inertia":
+            spread = validate(InertiaSpread, value, where)
+            for sigma, arguments in ((spread.scale, SCALES), (spread.rotate_deg, ROTATIONS)):
+                if sigma is None:
+                    continue
+                normal = Normal(normal=0.0, sigma=sigma)
+                for argument in arguments:
+                    yield Variable(f"{name}.{argument}", key, normal, ((*paths[0], argument),))
+        else:
+            distribution = _distribution(tree, name, paths, value, where)
+            yield Variable(name, key, distribution, tuple(paths))
+
+
+def _distribution(
+    tree: Tree, name: str, paths: Sequence[Path], value: Any, where: str
+) -> Distribution:
+    distribution, nominals = read_distribution(value, where), [value_at(tree, p) for p in paths]
+    group, is_element = paths[0][0], name.endswith("]")
+    if not distribution.is_number and (group in ("robot", "gains") or is_element):
+        raise InputError("numbers were expected")
+    has_number = all(type(nominal) in (int, float) for nominal in nominals)
+    if (distribution.relative or distribution.offset) and not has_number:
+        raise InputError(f"relative or offset, but {name} is {short(nominals[0])}, no number")
+    if group != "robot":
+        return distribution
+    if paths[0][-1] == "inertia" and not distribution.relative:
+        raise InputError("a factor of an inertia needs relative: true")
+    factor = least_factor(paths[0])
+    return distribution if factor is None else distribution.at_least(factor, min(nominals))
+
+
+def _check_overlaps(study: Study, variables: Sequence[Variable]) -> None:
+    first: dict[tuple[Path, ...], Variable] = {}
+    for variable in variables:
+        if (other := first.setdefault(variable.paths, variable)) is not variable:
+            raise InputError(
+                f"{study.where}: vary.{variable.key}: {variable.name} is varied by {other.key} "
+                "already"
+            )
+    for variable in variables:
+        path = variable.paths[0]
+        where = f"{study.where}: vary.{variable.key}: {variable.name}"
+        if "inertia" in path[:-1] and (path[:-1],) in first:
+            raise InputError(f"{where} is part of an inertia that is varied as a whole")
+        if path == ("scenario", "robot") and any(v.group == "robot" for v in variables):
+            raise InputError(
+                f"{study.where}: vary.scenario.robot: cannot be varied together with robot.*"
+            )
+
+
+def _all_faults(value: Any, where: str, names: RobotNames) -> Iterator[Variable]:
+    if not isinstance(value, dict):
+        raise InputError(f"a mapping of faults was expected, got {short(value)}")
+    for text, distribution in value.items():
+        own = f"{where}.{text}"
+        with errors_at(own):
+            yield from _faults(str(text), read_distribution(distribution, own), names)
+
+
+def _faults(key: str, distribution: Distribution, names: RobotNames) -> Iterator[Variable]:
+    """Yield the variables of a fault: its text without the last number, or with ``T`` as time."""
+    kinds, name = PLANT_KINDS, key.partition("@")[0]
+    kind = kinds[one_of(name, kinds, "kind of fault", listing="--fault list")]
     if distribution.relative or distribution.offset:
-        raise InputError(f"{where}: a fault has no nominal value: relative and offset need one")
+        raise InputError("a fault has no nominal value: relative and offset need one")
     if not distribution.is_number:
-        raise InputError(f"{where}: numbers were expected")
-    head, each, _ = key.partition(EACH)
-    if not each:
-        elements = [key]
-    elif not kind.argument or not kind.argument.about or not key.endswith(EACH):
-        raise InputError(f"{EACH} is allowed only at the end of a fault of axes or actuators")
-    else:
-        elements = [f"{head}:{name}" for name in _all(kind.argument.about, names)]
-    return [
-        OfFault(f"faults.{text}", f"faults.{key}", distribution, _template(text, kind))
-        for text in elements
-    ]
+        raise InputError("numbers were expected")
+    head, each, _ = key.partition(EACH_OF_FAULT)
+    elements = [key]
+    if each:
+        about = kind.argument.about if kind.argument else None
+        if not about or not key.endswith(EACH_OF_FAULT):
+            raise InputError(
+                f"{EACH_OF_FAULT} is allowed only at the end of a fault of axes or actuators"
+            )
+        elements = [f"{head}:{name}" for name in _names(about, names)]
+    for text in elements:
+        path = (FAULTS, _template(text, kind))
+        yield Variable(f"{FAULTS}.{text}", f"{FAULTS}.{key}", distribution, (path,))
 
 
 def _template(text: str, kind: Kind) -> str:
@@ -98,7 +197,7 @@ def _template(text: str, kind: Kind) -> str:
     return text + "={}"
 
 
-def _all(about: About, names: RobotNames) -> list[str]:
+def _names(about: About, names: RobotNames) -> list[str]:
     match about:
         case About.WHEEL:
             return list(names.wheels)
@@ -111,91 +210,3 @@ def _all(about: About, names: RobotNames) -> list[str]:
         case About.BASE_AXIS:
             group = "base"
     return [names.axes[number] for number in axes_of(group, about, names)]
-
-
-def _written(value: Value) -> str:
-    """Return a text that is read back as exactly the same number."""
-    return repr(float(value)).removesuffix(".0")
-
-
-def variables_of(study: Study, nominals: Sequence[Nominal]) -> list[Variable]:
-    """Return all variables, in the file's order; ``*`` gives one variable per element.
-
-    Args:
-        study: the file.
-        nominals: the nominal flight of each law.
-
-    Raises:
-        InputError: names the key of ``vary`` that is wrong.
-    """
-    variables: list[Variable] = []
-    for key, value in study.vary.items():
-        where = f"{study.where}: vary.{key}"
-        if key == FAULTS:
-            variables += _faults(value, where, nominals[0])
-            continue
-        with told_at(where):
-            variables += _of_key(key, value, where, nominals)
-    _check_places(study, variables)
-    return variables
-
-
-@contextmanager
-def told_at(where: str) -> Iterator[None]:
-    """Prefix errors with file and key."""
-    try:
-        yield
-    except InputError as error:
-        text = str(error)
-        raise InputError(text if text.startswith(where) else f"{where}: {text}") from None
-
-
-def _of_key(key: str, value: Any, where: str, nominals: Sequence[Nominal]) -> Sequence[Variable]:
-    parts = parts_of(key)
-    group = one_of(parts[0].word, GROUPS, "group")
-    if parts[0].element or group == FAULTS:
-        raise InputError(f"{group} has no elements")
-    nominal, inner = nominals[0], parts[1:]
-    if not inner:
-        raise InputError(f"a name was expected, as in {group}.NAME")
-    if group == "robot":
-        return robot_variables(key, inner, value, where, nominal.robot)
-    if group == "scenario":
-        return option_variables(key, inner, value, where, nominal)
-    if group == "gains":
-        return gain_variables(key, inner, value, where, nominals)
-    return node_variables(key, inner, value, where, nominal, group)
-
-
-def _faults(value: Any, where: str, nominal: Nominal) -> list[Variable]:
-    if not isinstance(value, dict):
-        raise InputError(f"{where}: a mapping of faults was expected, got {short(value)}")
-    faults: list[Variable] = []
-    for text, distribution in value.items():
-        own = f"{where}.{text}"
-        with told_at(own):
-            faults += fault_variables(str(text), distribution, own, nominal.names)
-    return faults
-
-
-def _check_places(study: Study, variables: Sequence[Variable]) -> None:
-    for what, count in Counter(variable.place for variable in variables).items():
-        if count > 1:
-            twice = [variable for variable in variables if variable.place == what]
-            raise InputError(
-                f"{study.where}: vary.{twice[1].key}: {twice[1].name} is varied by "
-                f"{twice[0].key} already"
-            )
-    whole = {(v.place) for v in variables if isinstance(v, InertiaScale)}
-    for variable in variables:
-        if isinstance(variable.place, tuple) and variable.place[:2] in whole - {variable.place}:
-            raise InputError(
-                f"{study.where}: vary.{variable.key}: {variable.name} is part of an inertia that "
-                "is varied as a whole"
-            )
-    if any(v.key.startswith("robot.") for v in variables):
-        for variable in variables:
-            if variable.name == "scenario.robot":
-                raise InputError(
-                    f"{study.where}: vary.scenario.robot: cannot be varied together with robot.*"
-                )
