@@ -25,7 +25,6 @@ from space_robot_sim.plant.settings import PLANT_KINDS, PlantNodeSettings
 from ...api import Scenario
 from ...flight.plan import Flight
 from ...scenario.faults import KINDS, PROCESS_KINDS
-from ...scenario.options import FlightPlan
 from ...scenario.resolved import ResolvedScenario
 from ..study import OF_THE_CAMPAIGN
 from .paths import Elements, Path, Unavailable, numbered, plain, replaced
@@ -100,7 +99,7 @@ class Nominal:
         given = self.scenario.given
         options = {
             name: given[name] if type(given.get(name)) in (int, float) else None
-            for name in FlightPlan.model_fields
+            for name in Scenario.model_fields
         }
         refused = {name: f"{name} cannot be set: {why}" for name, why in OF_THE_CAMPAIGN.items()}
         refused["gains"] = "gain sets are chosen by laws: [LAW=SET, LAW=OTHER_SET]"
@@ -184,9 +183,8 @@ class Nominal:
         return replace(
             nominal,
             options=options,
-            settings=nominal.settings._replace(
-                plant=plant, gains=merge(nominal.settings.gains, gains)
-            ),
+            plant=plant,
+            gains=merge(nominal.gains, gains),
             robots=robots.with_plant(variation.plant_robot) if variation.plant_robot else robots,
             laws=laws,
             swaps=[(tick, laws[law.name]) for tick, law in nominal.swaps],
