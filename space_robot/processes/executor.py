@@ -352,8 +352,8 @@ class _ClusterTask:
         here = versions()
         for name, version in self.versions.items():
             if here.get(name) != version:
-                found = f"{name} is {here.get(name)} on a worker, {version} here"
-                raise SpaceRobotError(found)
+                text = f"{name} is {here.get(name)} on a worker, {version} here"
+                raise SpaceRobotError(text)
         with _one_at_a_time:
             try:
                 with _interrupted_after(self.timeout_s):

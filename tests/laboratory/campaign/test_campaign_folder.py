@@ -128,15 +128,14 @@ def test_a_folder_imports_and_opens_nothing_unless_it_is_trusted(
     monkeypatch.syspath_prepend(tmp_path)
     law, target = "law_of_somebody:Free", f"capture@0.001:{tmp_path}/target.yaml"
     in_parameters = {"parameters": {"controller": {"controller": law}}}
-    for number, other in enumerate(
-        (
-            {"laws": ["ctc", law]},
-            {"laws": ["ctc"], "scenario": {"duration": 0.01, **in_parameters}},
-            {"laws": [f"ctc={tmp_path}/gains"]},
-            {"vary": {"scenario.case": {"choice": ["1", str(tmp_path / "case.yaml")]}}},
-            {"scenario": {"duration": 0.01, "events": [target]}},
-        )
-    ):
+    others: tuple[dict[str, Any], ...] = (
+        {"laws": ["ctc", law]},
+        {"laws": ["ctc"], "scenario": {"duration": 0.01, **in_parameters}},
+        {"laws": [f"ctc={tmp_path}/gains"]},
+        {"vary": {"scenario.case": {"choice": ["1", str(tmp_path / "case.yaml")]}}},
+        {"scenario": {"duration": 0.01, "events": [target]}},
+    )
+    for number, other in enumerate(others):
         folder = Path(shutil.copytree(whole, tmp_path / str(number)))
         study = Study.model_validate({**CONTENT, "require": {}, **other})
         changed = FlownCampaign.open(whole).manifest.model_copy(update={"study": study.content})

@@ -120,8 +120,13 @@ def test_closing_the_iterator_leaves_nothing() -> None:
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGKILL])
 def test_workers_end_with_their_starter(number: signal.Signals) -> None:
     """In each of two is an item; their server ends too."""
-    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
-    process = subprocess.Popen([sys.executable, "-c", STARTER], text=True, cwd=ROOT, **pipes)
+    process = subprocess.Popen(
+        [sys.executable, "-c", STARTER],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        cwd=ROOT,
+    )
     try:
         assert process.stdout is not None
         pids = {int(word) for _ in range(2) for word in process.stdout.readline().split()}
