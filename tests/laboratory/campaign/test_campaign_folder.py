@@ -23,7 +23,7 @@ from space_robot.campaign.report.findings import Findings
 from space_robot.campaign.row.row import Row, Task
 from space_robot.campaign.store.manifest import Columns, Manifest
 from space_robot.campaign.store.software import file_digests, source_digest
-from space_robot.campaign.store.store import CampaignStore, begin_or_resume, held_store
+from space_robot.campaign.store.store import begin_or_resume, held_store
 from space_robot.campaign.study import Study
 from space_robot_control.laws.names import NotTrustedError
 from space_robot_msgs_py.errors import InputError
@@ -172,33 +172,15 @@ def test_any_change_of_any_source_changes_the_digest_of_the_software(tmp_path: P
     assert len({*digests, source_digest(tmp_path)}) == 12
 
 
-def test_a_full_disk_is_told_in_a_line(tmp_path: Path) -> None:
-    with CampaignStore(tmp_path / "campaign.sqlite", is_read_only=False) as store:
-        store.add(Row(Task(0, "tde_stc"), "complete"))
-        pages = store._database.execute("PRAGMA page_count").fetchone()[0]
-        store._database.execute(f"PRAGMA max_page_count = {pages}")
-        band = {"s": np.zeros(9999, np.float32)}
-        with pytest.raises(InputError, match=r"database or disk is full; the same command"):
-            store.add(Row(Task(1, "tde_stc"), "complete", bands=band))
-        assert [row.task.run for row in store.rows()] == [0]
-
-
-@given(
-    st.dictionaries(st.sampled_from("abc"), st.floats()),
-    st.dictionaries(st.text(max_size=3), st.lists(st.floats(width=32), max_size=3), max_size=3),
-)
-def test_every_bit_comes_back(
-    numbers_by_name: dict[str, float], bands: dict[str, list[float]]
-) -> None:
-    values = {name: np.array(band, np.float32) for name, band in bands.items()}
-    row = Row(Task(3, "ctc"), "complete", "", 0.1, numbers_by_name, numbers_by_name, {}, values)
+@given(st.lists(st.floats(), max_size=3), st.lists(st.floats(width=32), max_size=3))
+def test_every_bit_comes_back(values: list[float], sizes: list[float]) -> None:
+    metrics, band = dict(zip("abc", values, strict=False)), np.array(sizes, np.float32)
+    row = Row(Task(3, "ctc"), "complete", metrics=metrics, bands={"b": band, "c": band[1:]})
     with TemporaryDirectory() as folder, held_store(Path(folder)) as store:
         store.add(row)
         (stored,) = store.rows()
-    assert repr(dict(stored.metrics)) == repr(numbers_by_name)
-    assert {n: b.tobytes() for n, b in stored.bands.items()} == {
-        n: b.tobytes() for n, b in values.items()
-    }
+    assert repr(stored.metrics) == repr(metrics)
+    assert [b.tobytes() for b in stored.bands.values()] == [band.tobytes(), band[1:].tobytes()]
 
 
 @pytest.mark.parametrize("is_cut", [False, True])
@@ -208,22 +190,16 @@ def test_damage_is_told_in_a_line(copy: Path, is_cut: bool) -> None:
     file.write_bytes(data[: len(data) // 2] if is_cut else b"x" * 100 + data[100:])
     with pytest.raises(InputError, match=r"campaign\.sqlite: damaged: [^\n]+$"):
         assert len(FlownCampaign.open(copy).table)
-    with pytest.raises(InputError, match=r"campaign\.sqlite: damaged: [^\n]+$"):
-        run(copy)
 
 
 def test_an_export_has_every_number(whole: Path, tmp_path: Path) -> None:
     flown = FlownCampaign.open(whole)
-    for suffix in ("csv", "parquet"):
-        flown.export(tmp_path / f"table.{suffix}")
-    same = pandas.read_csv(tmp_path / "table.csv", float_precision="round_trip")
-    numbers_only = [name for name in same if str(name).startswith(("vary.", "metric."))]
-    assert same[numbers_only].equals(flown.table[numbers_only])
-    again = pandas.read_parquet(tmp_path / "table.parquet")
+    flown.export(tmp_path / "table.csv")
+    flown.export(tmp_path / "table.parquet")
+    again = pandas.read_csv(tmp_path / "table.csv", float_precision="round_trip")
     assert again["metric.attitude.max"].equals(flown.table["metric.attitude.max"])
+    again = pandas.read_parquet(tmp_path / "table.parquet")
     assert (again["band.attitude"][0] == flown.table["band.attitude"][0]).all()
-    with pytest.raises(InputError, match="suffix"):
-        flown.export(tmp_path / "table.xlsx")
 
 
 def content_of(study: dict[str, object]) -> dict[str, object]:
