@@ -96,9 +96,9 @@ class Nominal:
         return {"robot": robot_tree(robot), "scenario": self._options(), **nodes, "gains": gains}
 
     def _options(self) -> Tree:
-        given = self.scenario.given
+        values = self.scenario.given
         options = {
-            name: given[name] if type(given.get(name)) in (int, float) else None
+            name: values[name] if type(values.get(name)) in (int, float) else None
             for name in Scenario.model_fields
         }
         refused = {name: f"{name} cannot be set: {why}" for name, why in OF_THE_CAMPAIGN.items()}

@@ -83,29 +83,29 @@ def matches(tree: Tree, pattern: str) -> dict[str, list[Path]]:
     """
     if not _PATH.fullmatch(pattern):
         raise InputError(f"{short(pattern)} is not a path such as robot.links[*].mass")
-    found: dict[str, list[Path]] = {"": [()]}
+    selected: dict[str, list[Path]] = {"": [()]}
     for word, element in _STEPS.findall(pattern):
-        found = _step(tree, found, word, element)
-    for name, paths in found.items():
+        selected = _step(tree, selected, word, element)
+    for name, paths in selected.items():
         if isinstance(value := value_at(tree, paths[0]), dict):
             raise InputError(f"{name} is a group: choose one of {', '.join(value) or 'none'} in it")
-    return found
+    return selected
 
 
 def _step(
-    tree: Tree, found: Mapping[str, list[Path]], word: str, element: str
+    tree: Tree, selected: Mapping[str, list[Path]], word: str, element: str
 ) -> dict[str, list[Path]]:
     """Follow one step of a pattern, leaving out elements without it if others have it."""
-    selected: dict[str, list[Path]] = {}
+    inner: dict[str, list[Path]] = {}
     refusals = []
-    for name, paths in found.items():
+    for name, paths in selected.items():
         try:
-            selected |= _inner(tree, name, paths, word, element)
+            inner |= _inner(tree, name, paths, word, element)
         except InputError as error:
             refusals.append(error)
-    if refusals and not selected:
+    if refusals and not inner:
         raise refusals[0]
-    return selected
+    return inner
 
 
 def _inner(

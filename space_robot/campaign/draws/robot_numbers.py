@@ -23,7 +23,7 @@ from .paths import Elements, Path, Unavailable
 
 Array = NDArray[np.float64]
 XYZ = ("x", "y", "z")
-SCALES = tuple(f"scale_{number}" for number in (1, 2, 3))
+LOG_FACTORS = tuple(f"scale_{number}" for number in (1, 2, 3))
 """Logarithms of the factors of an inertia's second moments, in ascending order of these."""
 ROTATIONS = tuple(f"rotate_{axis}" for axis in XYZ)
 """Rotations of an inertia about the body's axes, degrees."""
@@ -146,7 +146,7 @@ def robot_with(robot: Robot, numbers: Mapping[Path, float], has_surfaces: bool) 
                     turns.setdefault(body, {})[argument] = float(value)
     _check_shares(plates)
     for body, arguments in turns.items():
-        factors = [exp(arguments.get(name, 0.0)) for name in SCALES]
+        factors = [exp(arguments.get(name, 0.0)) for name in LOG_FACTORS]
         turn = [arguments.get(name, 0.0) * (math.pi / 180.0) for name in ROTATIONS]
         inertia[body] = spread(inertia[body], factors, turn)
     shift = -com[0]

@@ -20,7 +20,7 @@ from ..study import Study
 from .distributions import Distribution, Normal, read_distribution
 from .nominal import Nominal
 from .paths import Path, matches, value_at
-from .robot_numbers import ROTATIONS, SCALES, is_always_consistent, least_factor
+from .robot_numbers import LOG_FACTORS, ROTATIONS, is_always_consistent, least_factor
 
 FAULTS = "faults"
 START = ("mission", "start_deg")
@@ -102,7 +102,7 @@ def _variables(tree: Tree, key: str, value: Any, where: str) -> Iterator[Variabl
             paths = [("plant", "initial_joints_deg", str(number))]
         if is_spread and paths[0][0] == "robot" and paths[0][-1] == "inertia":
             spread = validate(InertiaSpread, value, where)
-            for sigma, arguments in ((spread.scale, SCALES), (spread.rotate_deg, ROTATIONS)):
+            for sigma, arguments in ((spread.scale, LOG_FACTORS), (spread.rotate_deg, ROTATIONS)):
                 if sigma is None:
                     continue
                 normal = Normal(normal=0.0, sigma=sigma)
