@@ -6,6 +6,7 @@ import json
 import platform
 import shutil
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -96,10 +97,7 @@ def reproduce(
         figures.path.mkdir(parents=True)
         planned = list(plan(rows, brief))
         order = sorted(planned, key=lambda flight: flight[0].shown != flight[1])  # longest first
-
-        def fly_one(flight: tuple[TableRow, Variant]) -> Result:
-            return fly(*flight, duration, figures, equipment)
-
+        fly_one = partial(_fly, duration=duration, figures=figures, equipment=equipment)
         flown = dict(zip(order, run_all(fly_one, order, jobs, progress), strict=True))
         results = [flown[flight] for flight in planned]
         if torques := {r.row.controller: r.base_torque for r in results if r.base_torque}:
@@ -120,6 +118,15 @@ def reproduce(
             shutil.rmtree(folder)
         work.rename(folder)
     return record
+
+
+def _fly(
+    flight: tuple[TableRow, Variant],
+    duration: float | None,
+    figures: FigureFolder,
+    equipment: Equipment,
+) -> Result:
+    return fly(*flight, duration, figures, equipment)
 
 
 def _write(

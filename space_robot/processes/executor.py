@@ -23,6 +23,7 @@ from concurrent.futures.process import BrokenProcessPool
 from contextlib import closing, contextmanager, suppress
 from dataclasses import dataclass
 from itertools import islice
+from multiprocessing import forkserver
 from typing import TYPE_CHECKING, Any, Generic, TypeVar, cast
 
 from space_robot_msgs_py.config.installation import install_command
@@ -197,9 +198,18 @@ def _submit(
 def start_fork_server() -> None:
     """Let the fork server import its modules now, while this process does something else."""
     multiprocessing.get_context("forkserver").set_forkserver_preload(PRELOADED)
-    from multiprocessing.forkserver import ensure_running
+    forkserver.ensure_running()
 
-    ensure_running()
+
+def _forget_fork_server() -> None:
+    """Let a forked child start a server of its own: it cannot wait for its parent's."""
+    server: Any = forkserver._forkserver
+    if server._forkserver_alive_fd is not None:
+        os.close(server._forkserver_alive_fd)  # the parent's ends when the parent does
+    server._forkserver_address = server._forkserver_alive_fd = server._forkserver_pid = None
+
+
+os.register_at_fork(after_in_child=_forget_fork_server)
 
 
 @contextmanager

@@ -33,7 +33,7 @@ RIGID = 0.5
 """Share of the slowest spring's rate below which a mode is one of the rigid robot."""
 LOWEST_HZ = 0.01
 """Lowest corner of a low-pass that is tried."""
-SCALES = (1e-3, 1e3)
+FACTORS = (1e-3, 1e3)
 """Factors on the assumed inertia between which its limit is searched."""
 
 
@@ -157,7 +157,9 @@ def check_flexible(law: ControlLaw, motions: FlexibleMotions, corner_hz: float) 
     corner: float | None = None
     if law.estimate != NO_ESTIMATE and not is_stable(0.0, laws):
         corner = _largest(LOWEST_HZ, 0.5 / period, lambda value: is_stable(value, laws))
-    scale = _largest(*SCALES, lambda x: is_stable(corner_hz, linear_laws(law, motions.postures, x)))
+    scale = _largest(
+        *FACTORS, lambda x: is_stable(corner_hz, linear_laws(law, motions.postures, x))
+    )
     return FlexibleCheck(radius, corner, scale)
 
 

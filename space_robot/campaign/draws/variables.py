@@ -23,7 +23,7 @@ from .paths import Path, matches, value_at
 from .robot_numbers import LOG_FACTORS, ROTATIONS, is_always_consistent, least_factor
 
 FAULTS = "faults"
-START = ("mission", "start_deg")
+MISSION_START = ("mission", "start_deg")
 EACH_OF_FAULT = ":[*]"
 """End of a fault's text: one variable for each axis, wheel or thruster."""
 _TIME = re.compile(r"(?<=@)T(?=$|:)")
@@ -97,7 +97,7 @@ def read_variables(study: Study, nominals: Sequence[Nominal]) -> list[Variable]:
 def _variables(tree: Tree, key: str, value: Any, where: str) -> Iterator[Variable]:
     is_spread = isinstance(value, dict) and bool({"scale", "rotate_deg"} & value.keys())
     for name, paths in matches(tree, key).items():
-        if paths[0][:2] == START:  # where the plant begins is a parameter of the plant
+        if paths[0][:2] == MISSION_START:  # where the plant begins is a parameter of the plant
             number = 1 + list(tree["mission"]["start_deg"]).index(paths[0][-1])
             paths = [("plant", "initial_joints_deg", str(number))]
         if is_spread and paths[0][0] == "robot" and paths[0][-1] == "inertia":

@@ -112,6 +112,7 @@ def test_a_law_that_cannot_fly_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
         return simulate(Flight(resolve(Scenario(robot=FILE, duration=0.01))))
 
     monkeypatch.setattr("space_robot.campaign.new_robot.make.simulate", fly)
+    monkeypatch.setattr("space_robot.campaign.new_robot.make.cores", lambda: 0)
     result = new(FILE)
     assert isinstance(result.exception, SpaceRobotError)
     assert "tde_smc: the flight diverged at tick 7" in str(result.exception)
@@ -130,6 +131,7 @@ def test_what_was_there_is_replaced_if_told_so_and_kept_if_anything_fails(
     mine.mkdir()
     (mine / "robot.yaml").write_text("old")
     monkeypatch.setattr("space_robot.campaign.new_robot.make.simulate", fail)
+    monkeypatch.setattr("space_robot.campaign.new_robot.make.cores", lambda: 0)
     new(FILE, "--out", "mine", "--force")
     assert (mine / "robot.yaml").read_text() == "old"
     assert list(tmp_path.iterdir()) == [mine]

@@ -191,5 +191,7 @@ def test_a_long_flight_flies_and_can_be_interrupted(tmp_path: Path) -> None:
 
 
 def test_a_log_for_which_there_is_no_room_is_refused() -> None:
-    with pytest.raises(InputError, match=r"duration 1e\+06 s: the log .* GB are free: fly a short"):
+    with pytest.raises(
+        InputError, match=r"1e\+06 s: the whole log needs .* GB are free: fly a short"
+    ):
         simulate(planned(duration=1e6))

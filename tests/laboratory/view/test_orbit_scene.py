@@ -390,7 +390,7 @@ def test_in_orbit_the_camera_sees_every_point_and_the_earth_below(
 def test_the_base_does_not_hide_the_arm(name: str, side: float) -> None:
     """It is on the other side of the Orbiter's z axis."""
     scenario = resolve(Scenario(robot=name, controller="ctc"))
-    robot, start = scenario.robots.plant, np.radians(scenario.settings.mission.joints_deg)
+    robot, start = scenario.robots.plant, np.radians(scenario.mission.joints_deg)
     poses = np.array([start, *(piece.goal for piece in scenario.reference.pieces)])
     found = clearest_side([(robot, np.tile([1.0, 0.0, 0.0, 0.0], (len(poses), 1)), poses)])
     assert np.array_equal(found, SIDES[0]) is (side > 0.0)
