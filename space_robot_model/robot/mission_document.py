@@ -160,6 +160,8 @@ def mission_layer(path: Path, node: str, robot: str) -> Tree:
         settings = trajectory_document(path, robot).parameters()
     elif set(content := read_yaml(path)) == {KEY}:
         settings = document_settings(content[KEY], f"{path}: {KEY}")
+    elif content.keys() & MissionDocument.model_fields.keys():
+        raise InputError(f"{path}: {next(iter(content))}: a mission stands below the key {KEY!r}")
     else:
         return node_parameters(path, node)
     return {key: v for key, v in settings.items() if (key in OF_PLANT) is (node == PLANT)}
