@@ -105,8 +105,20 @@ class Contraction(NamedTuple):
     radius: Extremes
 
 
+def flown_inertia(robot: Robot, log: FlightLog, ticks: NDArray[np.intp]) -> Array:
+    """Return H_S (K, m, m) of ``robot`` at ``ticks`` (K,) of a flight, passive joints locked."""
+    inertia, model = np.empty((len(ticks), log.axes, log.axes)), RhoSpaceModel.allocate(robot.n)
+    error, still = np.zeros(4), np.zeros(3)
+    for k, tick in enumerate(ticks):
+        attitude_error_into(log.reference_base[tick, :4], log.quaternion[tick], error)
+        joints = log.joint_positions[tick], log.omega_base[tick], log.joint_velocities[tick]
+        rho_space_into(robot.nominal.model, error, *joints, still, still, model)
+        inertia[k] = model.inertia
+    return inertia
+
+
 def contraction(robot: Robot, h_bar: Array, log: FlightLog) -> Contraction:
-    """Return norm and radius of W along ``log``, passive joints locked.
+    """Return norm and radius of W along ``log``.
 
     Args:
         robot: the robot that flew, with its payload.
@@ -115,14 +127,7 @@ def contraction(robot: Robot, h_bar: Array, log: FlightLog) -> Contraction:
     """
     period = log.timebase.period
     ticks = np.arange(0, log.ticks, max(1, round(LEMMA_1_EVERY_S / period)))
-    inertia, model = np.empty((len(ticks), log.axes, log.axes)), RhoSpaceModel.allocate(robot.n)
-    error, still = np.zeros(4), np.zeros(3)
-    for k, tick in enumerate(ticks):
-        attitude_error_into(log.reference_base[tick, :4], log.quaternion[tick], error)
-        joints = log.joint_positions[tick], log.omega_base[tick], log.joint_velocities[tick]
-        rho_space_into(robot.nominal.model, error, *joints, still, still, model)
-        inertia[k] = model.inertia
-    w = contraction_matrix(inertia, h_bar)
+    w = contraction_matrix(flown_inertia(robot, log, ticks), h_bar)
 
     def extremes(values: Array) -> Extremes:
         high, low = int(np.argmax(values)), int(np.argmin(values))
