@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+import math
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal, NamedTuple
 
@@ -164,6 +165,15 @@ class Study(StrictModel):
             raise ValueError("the same law twice")
         return laws
 
+    @field_validator("vary", mode="after")
+    @classmethod
+    def _is_finite(cls, vary: dict[str, Any]) -> dict[str, Any]:
+        for name, value in vary.items():
+            for number in _numbers(value):
+                if not math.isfinite(number):
+                    raise ValueError(f"{name}: finite numbers were expected, got {number}")
+        return vary
+
     @field_validator("metrics", mode="after")
     @classmethod
     def _are_functions(cls, metrics: dict[str, Any]) -> dict[str, str]:
@@ -223,6 +233,15 @@ class Study(StrictModel):
         copied = self.model_copy()
         copied._where = where
         return copied
+
+
+def _numbers(value: Any) -> Iterator[float]:
+    """Yield the numbers in a distribution."""
+    if isinstance(value, float):
+        yield value
+    elif isinstance(value, (dict, list)):
+        for inner in value.values() if isinstance(value, dict) else value:
+            yield from _numbers(inner)
 
 
 def check_option(name: str) -> None:

@@ -23,7 +23,7 @@ from concurrent.futures.process import BrokenProcessPool
 from contextlib import closing, contextmanager, suppress
 from dataclasses import dataclass
 from itertools import islice
-from multiprocessing import forkserver
+from multiprocessing import forkserver, resource_tracker
 from typing import TYPE_CHECKING, Any, Generic, TypeVar, cast
 
 from space_robot_msgs_py.config.installation import install_command
@@ -39,7 +39,7 @@ if TYPE_CHECKING:
 Item = TypeVar("Item")
 Result = TypeVar("Result")
 
-PRELOADED = ["space_robot.campaign.row.fly"]
+PRELOADED = ["space_robot.campaign.row.preloaded"]
 """Modules that the fork server imports, so that a worker begins within milliseconds."""
 CONNECT_S = 5.0
 """Longest wait for an answer of a scheduler, s."""
@@ -106,6 +106,11 @@ def run_many(
         raise InputError(f"workers {workers}, timeout_s {timeout_s}: at least 0, above 0")
     if scheduler is not None:
         return _on_cluster(scheduler, function, items, timeout_s)
+    if workers and is_daemonic():
+        raise InputError(
+            "a daemonic process, such as a worker of multiprocessing.Pool, cannot start processes: "
+            "workers=0 flies in it"
+        )
     if workers:
         return _in_processes(workers, function, iter(items), timeout_s)
     if timeout_s is None:
@@ -141,6 +146,11 @@ def cores() -> int:
     return len(os.sched_getaffinity(0))
 
 
+def is_daemonic() -> bool:
+    """Return True if this process cannot have children, as the workers of a Pool."""
+    return multiprocessing.current_process().daemon
+
+
 def as_exception(error: BaseException) -> Exception:
     """Return an error of a function, as a text if raising it would end the process."""
     return error if isinstance(error, Exception) else RuntimeError(one_line_of(error))
@@ -161,8 +171,8 @@ class _Worker:
     """A process that works on one item at a time."""
 
     def __init__(self) -> None:
+        start_fork_server()
         context = multiprocessing.get_context("forkserver")
-        context.set_forkserver_preload(PRELOADED)
         self._executor = ProcessPoolExecutor(1, context, _begin_worker)
         self._process: Any = None
         self.item: Any = None
@@ -180,8 +190,8 @@ class _Worker:
         return self._executor.submit(function, item)
 
     def kill(self) -> None:
-        if self._process is not None:
-            self._process.kill()
+        for process in list((self._executor._processes or {}).values()):
+            process.kill()  # also one that had just been started when Ctrl-C came
         self._executor.shutdown(cancel_futures=True)
 
 
@@ -198,7 +208,13 @@ def _submit(
 def start_fork_server() -> None:
     """Let the fork server import its modules now, while this process does something else."""
     multiprocessing.get_context("forkserver").set_forkserver_preload(PRELOADED)
-    forkserver.ensure_running()
+    resource_tracker.ensure_running()  # first: its start ends the mask
+    # inherited: Ctrl-C while it imports would end it with a traceback
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])
+    try:
+        forkserver.ensure_running()
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def _forget_fork_server() -> None:

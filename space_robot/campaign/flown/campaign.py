@@ -22,7 +22,7 @@ from space_robot_msgs_py.errors import InputError
 
 from ...analysis.own_metric import SESSION, MetricFunction, check_names, text_of
 from ...console.progress import check_progress, rated_progress
-from ...processes.executor import check_scheduler, cores, start_fork_server
+from ...processes.executor import check_scheduler, cores, is_daemonic, start_fork_server
 from ...processes.scratch_folder import ScratchFolder
 from ..store.store import DATABASE, begin_or_resume, held_store
 from ..study import Study, read_study
@@ -132,9 +132,14 @@ class Campaign:
             workers = 0
             warn(f"metrics {', '.join(local)}: {OF_SESSION}: this process flies alone")
         prepared = Preparation.of(self.study, seed, runs)
-        processes = cores() if workers is None else as_whole_number(workers, "workers", 0)
+        usual = 0 if is_daemonic() else cores()
+        processes = usual if workers is None else as_whole_number(workers, "workers", 0)
         if timeout_s is not None:
             as_positive(timeout_s, "timeout_s")
+            if not processes and scheduler is None:
+                raise InputError(
+                    "a time limit needs a worker process, which can be ended: 1 or more"
+                )
         if processes and scheduler is None:
             start_fork_server()
         manifest = prepared.manifest
