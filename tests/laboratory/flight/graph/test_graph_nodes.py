@@ -7,6 +7,7 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
 import pytest
 from flights import Start, forked_space_robot, ros_environment, simulated
 from forked import Forked
@@ -17,7 +18,6 @@ from space_robot_model.robot import Robot
 from space_robot_model.robot.markers import RobotMarkers
 from space_robot_model.robot.placements import RobotPoses
 from space_robot_msgs_py import topics
-from space_robot_msgs_py.bag.folder import open_bag
 from space_robot_msgs_py.bag.reader import read_flight
 from space_robot_msgs_py.ros.process import set_defaults
 from space_robot_msgs_py.samples import Timebase
@@ -94,12 +94,6 @@ def step(ground: Ground, ticks: int) -> str:
     return str(ground.call(Trigger, "/plant_node/step", Trigger.Request()).message)
 
 
-def hears(ground: Ground, node: str, topic: str) -> bool:
-    """Whether a node's subscription is known."""
-    known = ground.node.get_subscriptions_info_by_topic(topic)
-    return node in [info.node_name for info in known]
-
-
 def test_killed_nodes_are_replaced_in_flight(start: Start, ground: Ground, tmp_path: Path) -> None:
     """Lockstep holds the plant while no controller or no mission is there; the next one takes over.
 
@@ -114,7 +108,6 @@ def test_killed_nodes_are_replaced_in_flight(start: Start, ground: Ground, tmp_p
     assert plant.returncode == 0, output
     assert "flew 0.1000 s" in output
     recorder = start("recorder", bag=tmp_path / "bag")
-    ground.until(lambda: hears(ground, "recorder_node", "/command"), "the recorder")
     waits["wait_for"] = wait_for("controller")
     listeners = {"wait_for": wait_for("plant"), "silence_timeout": 0.0}
     plant = start("plant", ticks=1_000, paused=True, **listeners)
@@ -135,8 +128,11 @@ def test_killed_nodes_are_replaced_in_flight(start: Start, ground: Ground, tmp_p
     assert ended(plant) == 0
     assert int(monitor.values["controller_node"]["references_held"]) == 0
     assert ended(recorder) == 0
-    assert open_bag(tmp_path / "bag").counts()["/command"] == 701
-    assert [law.name for law in read_flight(tmp_path / "bag").laws] == ["tde_stc", "ctc"]
+    log = read_flight(tmp_path / "bag")
+    assert [law.name for law in log.laws] == ["tde_stc", "ctc"]
+    assert log.commanded_torque is not None
+    missing = np.flatnonzero(~np.isfinite(log.commanded_torque).all(axis=1))
+    assert np.all(missing <= 100), "only the first controller does not wait for the recorder"
 
 
 def test_law_and_gains_are_described_and_what_cannot_be_is_refused_with_its_reason(
