@@ -34,13 +34,12 @@ if TYPE_CHECKING:
     from space_robot_model.robot.dynamics import bias_force, forward_dynamics, mass_matrix
 
     from .analysis.load_bag import load_bag
-    from .api import Bench, FlownFlight
+    from .api import Bench, FlownFlight, Scenario
     from .api.fly_many import bench_many, fly_many
     from .api.replayed import replay
     from .campaign.flown import Campaign, FlownCampaign
     from .learning import make, make_vec
     from .scenario.disturbances import sampled
-    from .scenario.scenario import Scenario
 
     __version__: str
 
@@ -68,7 +67,7 @@ MODULES = {
     "FlownCampaign": "space_robot.campaign.flown",
     "FlownFlight": "space_robot.api",
     "Robot": "space_robot_model.robot",
-    "Scenario": "space_robot.scenario.scenario",
+    "Scenario": "space_robot.api",
     "bench_many": "space_robot.api.fly_many",
     "bias_force": "space_robot_model.robot.dynamics",
     "fly_many": "space_robot.api.fly_many",

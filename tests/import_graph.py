@@ -18,8 +18,6 @@ PACKAGES = (
     "space_robot",
 )
 """From the ground up."""
-VERBS = "space_robot.scenario.scenario"
-"""The class that a user flies: its methods import what carries them out, far above it."""
 Graph = Mapping[str, set[str]]
 
 
@@ -47,8 +45,7 @@ def imports() -> Graph:
 
 def _imported(name: str, file: Path) -> Iterator[str]:
     package = name if file.name == "__init__.py" else name.rpartition(".")[0]
-    tree = ast.parse((ROOT / file).read_text("utf-8"))
-    for node in tree.body if name == VERBS else ast.walk(tree):
+    for node in ast.walk(ast.parse((ROOT / file).read_text("utf-8"))):
         if isinstance(node, ast.Import):
             for alias in node.names:
                 yield from _known(alias.name)

@@ -19,7 +19,7 @@ from space_robot_msgs_py.config.validation import short
 from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.samples import RobotState
 
-from ..scenario.scenario import Scenario
+from .scenario import FlyableScenario as Scenario
 
 try:
     import gymnasium

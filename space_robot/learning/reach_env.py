@@ -32,8 +32,7 @@ try:
 except ImportError:
     raise ImportError(f"gymnasium is not installed: {install_command('gym')}") from None
 
-from space_robot.scenario.scenario import Scenario
-
+from ..api import Scenario
 from ..flight.batch.lane_loop import InLanes
 from ..flight.batch.lane_memory import in_lanes, record_numbers
 from ..flight.compilation import compile_kernels
