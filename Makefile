@@ -87,7 +87,7 @@ lint: $(VENV)/.tests
 
 # Else both test processes would begin with it. It begins while the tests' tools are installed.
 kernels: $(VENV)/.flies
-	$(VENV)/bin/python -c "from space_robot.flight.batch.compilation import compile_all as c; c()"
+	$(VENV)/bin/python -c "from space_robot.flight.compilation import compile_all as c; c()"
 
 docs: $(VENV)/.docs
 	NO_MKDOCS_2_WARNING=1 $(VENV)/bin/python -m mkdocs --quiet build --strict

@@ -33,8 +33,8 @@ from space_robot.cli.launch_arguments import (
     launched_flight,
     refuse_unknown,
 )
-from space_robot.flight.graph.launched import LaunchedGraph, launched_parameters, report_failure
 from space_robot.flight.graph.node_names import started_nodes
+from space_robot.flight.graph.orchestrator import LaunchedGraph, launched_parameters, report_failure
 from space_robot_msgs_py.ros.process import defaults
 
 AUTOSTART, SHUTDOWN = "autostart", "shutdown"

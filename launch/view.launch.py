@@ -31,7 +31,7 @@ from launch.substitutions import EqualsSubstitution, LaunchConfiguration
 from launch_ros.actions import Node
 
 from space_robot.cli.launch_arguments import launch_arguments, refuse_unknown
-from space_robot.flight.graph.launched import report_failure
+from space_robot.flight.graph.orchestrator import report_failure
 
 RVIZ, PAGE = "rviz", "page"
 VIEW = [sys.executable, "-m", "space_robot.cli.main", "view"]

@@ -36,10 +36,10 @@ if TYPE_CHECKING:
     from .analysis.load_bag import load_bag
     from .api import Bench, FlownFlight, Scenario
     from .api.fly_many import bench_many, fly_many
-    from .api.replayed import replay
     from .campaign.flown import Campaign, FlownCampaign
+    from .flight.replay.run import replay
     from .learning import make, make_vec
-    from .scenario.disturbances import sampled
+    from .scenario.objects import sampled
 
     __version__: str
 
@@ -76,8 +76,8 @@ MODULES = {
     "make": "space_robot.learning",
     "make_vec": "space_robot.learning",
     "mass_matrix": "space_robot_model.robot.dynamics",
-    "replay": "space_robot.api.replayed",
-    "sampled": "space_robot.scenario.disturbances",
+    "replay": "space_robot.flight.replay.run",
+    "sampled": "space_robot.scenario.objects",
 }
 """The module of each name."""
 

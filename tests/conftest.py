@@ -33,7 +33,7 @@ from forked import END_S, Forked
 from paths import CONFIG, TESTS
 
 from space_robot.flight.graph.domain import ros_domain
-from space_robot.processes.node_modules import MODULES
+from space_robot.processes import MODULES
 from space_robot_model.robot import Robot
 
 if TYPE_CHECKING:

@@ -10,6 +10,7 @@ from __future__ import annotations
 import os
 import runpy
 import signal
+import socket
 import subprocess
 import sys
 import threading
@@ -21,6 +22,8 @@ from types import TracebackType
 from typing import cast
 
 from paths import TESTS
+
+from space_robot.processes.fork_server import ForkServer, Target, fork, serve
 
 ERRORS = "FORKED_STANDARD_ERROR"
 """In a command's environment: the inode of the pipe that takes its standard error."""
@@ -135,12 +138,25 @@ class Forked:
         self.communicate(END_S)
 
 
+def forked_server(target: Target) -> ForkServer:
+    """Fork a server from this process."""
+
+    def start(theirs: socket.socket, ours: socket.socket) -> int:
+        def begin() -> None:
+            ours.close()
+            serve(theirs, target, starter)
+
+        starter = os.getpid()
+        return fork(begin)
+
+    return ForkServer(start)
+
+
 def main() -> None:
     """In the forked process: run the command or program that `Forked.of_command` asks for."""
     from setproctitle import setproctitle
 
     from space_robot.flight.graph.node_server import run_program
-    from space_robot.processes.fork_server import ForkServer
 
     _take_own_standard_error()
     streams = (os.fdopen(n, "w", encoding="utf-8", closefd=False) for n in (1, 2))
@@ -148,7 +164,7 @@ def main() -> None:
     signal.signal(signal.SIGINT, signal.default_int_handler)  # as in a Python just started
     _forget_the_tests_folder()
     setproctitle("space_robot: server of the nodes")
-    servers = [ForkServer.of_this_process(run_program)]  # all that a node needs is loaded
+    servers = [forked_server(run_program)]  # all that a node needs is loaded
     setproctitle("space-robot")
     begun_anew = ForkServer.of_module
     ForkServer.of_module = lambda module: servers.pop() if servers else begun_anew(module)  # type: ignore[method-assign,assignment]

@@ -19,7 +19,7 @@ from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
 from space_robot.cli.main import cli
-from space_robot.processes.node_modules import MODULES
+from space_robot.processes import MODULES
 from space_robot_msgs_py import topics
 
 ROOT = Path(__file__).resolve().parents[1]

@@ -54,7 +54,6 @@ class FlightPage:
         return f"<FlightPage: {len(self.html.encode()) / 1e6:.1f} MB>"
 
     def _repr_html_(self) -> str:
-        """Show the page in a frame, whose scripts and styles do not meet the notebook's."""
         return (
             f'<iframe srcdoc="{escape(self.html)}" allowfullscreen '
             f'style="border: 0; width: 100%; height: {self.height}px"></iframe>'

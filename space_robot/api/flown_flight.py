@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -14,16 +14,18 @@ from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.config.arguments import as_path
 from space_robot_msgs_py.config.text import html_table
 from space_robot_msgs_py.config.validation import one_of, short
-from space_robot_msgs_py.errors import InputError
+from space_robot_msgs_py.errors import FlightError, InputError
 
 from ..analysis import analyze
 from ..analysis.own_metric import MetricFunction, finite_value
 from ..analysis.report_tables import rms_table
 from ..analysis.words import flown
-from ..flight.bag_path import check_bag_path
-from ..flight.ending import COMPLETE, Ending
-from ..flight.flight_messages import record
+from ..console.progress import flight_progress
+from ..flight.compilation import compile_kernels
+from ..flight.ending import COMPLETE, DIVERGED, Ending
+from ..flight.flight_messages import check_bag_path, record
 from ..flight.plan import Flight
+from ..flight.simulate import simulate
 from .flight_page import HEIGHT_PX, FlightPage, draw_page, show_page
 
 if TYPE_CHECKING:
@@ -31,14 +33,6 @@ if TYPE_CHECKING:
     from pandas import DataFrame
 
     from ..analysis.figures.figure_set import FigureSet
-from collections.abc import Callable
-
-from space_robot_msgs_py.errors import FlightError
-
-from ..console.progress import flight_progress
-from ..flight.compilation import compile_kernels
-from ..flight.ending import DIVERGED
-from ..flight.simulate import simulate
 
 
 class FlownFlight:
@@ -52,15 +46,7 @@ class FlownFlight:
         log: FlightLog,
         keep_log: bool = True,
     ) -> None:
-        """Store flight, ending, bag and log.
-
-        Args:
-            flight: that was flown.
-            ending: of the flight.
-            bag: folder of the bag; None if it was not recorded.
-            log: of the flight.
-            keep_log: False: the log is let go once its report is computed.
-        """
+        """``bag``: its folder, if recorded; ``keep_log``: False: only its report is kept."""
         self.flight, self.ending, self.bag = flight, ending, bag
         self._log: FlightLog | None = log
         if not keep_log:
@@ -69,11 +55,7 @@ class FlownFlight:
 
     @property
     def log(self) -> FlightLog:
-        """Log of the flight, one row per tick.
-
-        Raises:
-            InputError: the log was not kept.
-        """
+        """Log of the flight, one row per tick; an `InputError` if it was not kept."""
         if self._log is None:
             raise InputError("no log was kept (keep_log=False): record the flight and read its bag")
         return self._log
@@ -103,11 +85,7 @@ class FlownFlight:
         return self.outcome == COMPLETE
 
     def check(self) -> Self:
-        """Return the flight itself if it is complete.
-
-        Raises:
-            FlightError: it ended early; the error that ended it.
-        """
+        """Return the flight if it is complete, or raise the `FlightError` that ended it."""
         self.ending.check()
         return self
 
@@ -121,10 +99,7 @@ class FlownFlight:
         return dict(self._report.get("metrics", {}))
 
     def metric(self, function: MetricFunction | str) -> float:
-        """Return a metric of your own.
-
-        Args:
-            function: of the flight's log, or its name, ``file.py:FUNCTION``.
+        """Return a metric of your own: a function of the log, or ``file.py:FUNCTION``.
 
         Raises:
             InputError: no log was kept; the function cannot be imported, raised an error, or
@@ -134,11 +109,7 @@ class FlownFlight:
 
     @cached_property
     def table(self) -> DataFrame:
-        """Log as a pandas data frame, with the columns of ``analyze --csv``.
-
-        Raises:
-            InputError: no log was kept, or pandas is not installed.
-        """
+        """Log as a pandas data frame, with the columns of ``analyze --csv``."""
         from ..analysis.export import dataframe  # slow to import
 
         return dataframe(self.log)
@@ -179,10 +150,7 @@ class FlownFlight:
         return figure
 
     def save(self, bag: str | Path) -> Path:
-        """Write the flight into a bag, as ``fly(bag=...)`` does; return its folder.
-
-        Args:
-            bag: folder to record to, which must not exist.
+        """Write the flight into a new folder ``bag``, as ``fly(bag=...)`` does; return its path.
 
         Raises:
             InputError: no log was kept, the bag cannot be written, or messages failed in flight.
@@ -253,7 +221,6 @@ class FlownFlight:
         return f"<FlownFlight: {what}, {self.ended_at_s:g} s, {self.outcome}{end}>"
 
     def _repr_html_(self) -> str:
-        """Show outcome and RMS in a notebook."""
         caption = repr(self)[1:-1]
         if not self.metrics:
             return html_table((), (), caption)
@@ -291,9 +258,8 @@ def flight_report(
 ) -> dict[str, Any]:
     """Return the ``metrics`` of a flight with ``outcome``, ``reason`` and ``ended_at_s``.
 
-    For a flight that ended early also its description, as far as it is not in ``metrics``,
-    ``planned_ticks``, ``bag`` (None if there is none), ``error`` and, if it ``diverged``, the tick
-    and time.
+    For a flight that ended early also its description, ``planned_ticks``, ``bag``, ``error`` and,
+    if it ``diverged``, the tick and time.
     """
     if ending.error is None:
         return metrics | ending.as_record()
@@ -315,18 +281,7 @@ def fly_in_process(
     progress: Callable[[float], object] | bool | None = None,
     keep_log: bool = True,
 ) -> FlownFlight:
-    """Fly a checked flight from the present state of its plant.
-
-    Args:
-        flight: to be flown.
-        bag: folder to record to; None: none.
-        progress: called regularly with the simulated time, s; True: a progress line.
-        keep_log: False: only the metrics are kept.
-
-    Raises:
-        InputError: the bag cannot be created, or there is no room for a log.
-    """
-    flight.check_in_process()
+    """Fly a checked flight from the present state of its plant; see `Scenario.fly`."""
     if bag:
         check_bag_path(bag)
     compile_kernels(bool(flight.plant.names.actuators))  # has a progress line of its own

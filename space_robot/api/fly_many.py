@@ -10,10 +10,9 @@ from space_robot_msgs_py.config.validation import short
 from space_robot_msgs_py.errors import InputError
 
 from ..console.progress import check_progress, rated_progress
-from ..flight.batch.batch import FlightBatch, batches
-from ..flight.batch.benches import Benches
-from ..flight.batch.compilation import compile_lanes
-from ..flight.compilation import compile_kernels
+from ..flight.batch import FlightBatch, batches
+from ..flight.benches import Benches
+from ..flight.compilation import compile_kernels, compile_lanes
 from ..flight.plan import Flight
 from .flown_flight import FlownFlight, fly_in_process
 from .scenario import FlyableScenario as Scenario

@@ -139,7 +139,6 @@ class SpaceRobotEnv(gymnasium.Env[Array, Array]):
         return cut
 
     def _errors(self, state: RobotState) -> tuple[Array, Array]:
-        """Return the errors of positions and of rates, (m,) each."""
         reference = self.bench.reference
         turn, rotation, omega = np.zeros(4), np.empty((3, 3)), np.empty(3)
         attitude_error_into(reference.quaternion, state.quaternion, turn)
@@ -153,7 +152,6 @@ class SpaceRobotEnv(gymnasium.Env[Array, Array]):
         )
 
     def _cost(self, action: Array) -> float:
-        """Return the cost per second of the true state; NaN if the state is not finite."""
         error, rate = self._errors(self.bench.truth)
         return float(
             4.0 * error[:3] @ error[:3]
@@ -168,11 +166,6 @@ class SpaceRobotEnv(gymnasium.Env[Array, Array]):
 
 
 def _drawn(draw: ScenarioDraw, rng: np.random.Generator | int) -> Scenario:
-    """Return a scenario drawn by a function.
-
-    Raises:
-        InputError: ``draw`` is not a function, or does not return a scenario.
-    """
     expected = "scenario: a Scenario, or a function of a random generator that returns one, was"
     if not callable(draw):
         raise InputError(f"{expected} expected, got {short(draw)}")

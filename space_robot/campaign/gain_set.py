@@ -15,7 +15,7 @@ from space_robot_sim.environment.environment import with_payload
 from ..console.files import atomic_file, make_folder
 from ..flight.plan import Scenario
 from ..scenario.node_settings import FlightSettings
-from ..scenario.robots import Robots
+from ..scenario.resolved import Robots
 from ..tuning.flexible import fast_inertia
 from ..tuning.gain_file import gain_files
 from ..tuning.inertia import SAMPLING, inertia_along, postures_along, sampled_reference

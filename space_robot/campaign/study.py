@@ -19,7 +19,7 @@ from space_robot_msgs_py.errors import InputError, explained_by
 
 from ..analysis.analysed_log import PointingBudget
 from ..analysis.own_metric import check_names, text_of
-from ..scenario.disturbances import as_disturbance
+from ..scenario.objects import as_disturbance
 from ..scenario.options import OPTIONS
 from ..scenario.resolve import resolve
 from ..scenario.scenario import Scenario

@@ -185,7 +185,7 @@ def rerun(
 
     from ..campaign.flown import FlownCampaign
     from ..console.terminal import echo_json
-    from ..flight.bag_path import check_bag_path
+    from ..flight.flight_messages import check_bag_path
     from .report_display import show_report
 
     if bag:

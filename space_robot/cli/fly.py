@@ -42,8 +42,8 @@ def fly(as_json: bool, bag: Path | None, **options: Any) -> None:
     from ..analysis import analyze
     from ..api.flown_flight import flight_report
     from ..console.terminal import echo_json
-    from ..flight.bag_path import check_bag_path, default_bag
     from ..flight.ending import Ending
+    from ..flight.flight_messages import check_bag_path, default_bag
     from ..flight.graph.orchestrator import fly as fly_graph
     from .report_display import show_next_steps, show_report
 

@@ -64,8 +64,8 @@ def goto(domain: int | None, namespace: str, **options: Any) -> None:
       space-robot goto --joints 0,120,220,0,-10,0 --base 0,0,10 --duration 20
       space-robot goto --base nadir --duration 120
     """
+    from ..flight.graph.node_services import go_to
     from ..flight.graph.orchestrator import require_ros
-    from ..flight.graph.simulation_calls import go_to
 
     require_ros()
     segment = _segment(**options)

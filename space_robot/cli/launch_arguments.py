@@ -58,7 +58,7 @@ class LaunchedFlight(NamedTuple):
 def _plan(
     context: click.Context, /, bag: Path | None, namespace: str, **options: Any
 ) -> LaunchedFlight:
-    from ..flight.bag_path import default_bag
+    from ..flight.flight_messages import default_bag
 
     if context.get_parameter_source("namespace") is ParameterSource.DEFAULT:
         namespace = ""

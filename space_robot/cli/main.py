@@ -20,9 +20,8 @@ from space_robot_msgs_py.config.text import choices, printable
 from space_robot_msgs_py.errors import SpaceRobotError
 from space_robot_msgs_py.ros.process import hold_to_standard_input
 
+from ..processes import COLLECTED_AT, MODULES, SUFFIX
 from ..processes.interruption import Interrupted, raising_signals
-from ..processes.memory import COLLECTED_AT
-from ..processes.node_modules import MODULES, SUFFIX
 
 _NO_COMMAND = re.compile(r"No such command '(.*?)'")
 _EXTRA = re.compile(r"Got unexpected extra arguments? \((.*)\)")

@@ -74,7 +74,6 @@ def replay(
 
     from ..console.files import check_writable
     from ..console.terminal import echo_json, terminal
-    from ..flight.replay.run import ReplayOptions
     from ..flight.replay.run import replay as run
 
     if other := sorted(set(parameters) - {"controller"}):
@@ -84,13 +83,11 @@ def replay(
     for file in filter(None, (table, plot and plot.with_suffix(".png"))):
         check_writable(file)
     done = run(
-        ReplayOptions(
-            bag,
-            parameters=parameters.get("controller", {}),
-            start_s=start,
-            end_s=math.inf if end is None else end,
-            **options,
-        )
+        bag,
+        parameters=parameters.get("controller", {}),
+        start_s=start,
+        end_s=math.inf if end is None else end,
+        **options,
     )
     report, period = done.report(), done.recording.timebase.period
     if table:

@@ -70,8 +70,8 @@ def reset(**options: Any) -> None:
 
 
 def _call(action: str, **options: Any) -> None:
+    from ..flight.graph.node_services import call_simulation
     from ..flight.graph.orchestrator import require_ros
-    from ..flight.graph.simulation_calls import call_simulation
 
     require_ros()
     click.echo(call_simulation(action, **options))

@@ -29,9 +29,8 @@ def simulate(as_json: bool, bag: Path | None, **options: Any) -> None:
     """
     from ..api.flown_flight import fly_in_process
     from ..console.progress import flight_progress
-    from ..flight.bag_path import check_bag_path
     from ..flight.compilation import compile_kernels
-    from ..flight.flight_messages import bag_remark
+    from ..flight.flight_messages import bag_remark, check_bag_path
     from .report_display import show_next_steps, show_report
 
     flight = plan_flight(**options)

@@ -53,11 +53,7 @@ class Snapshot(NamedTuple):
 
 
 def check_for_bench(flight: Flight) -> None:
-    """Check that a flight can be put on a bench.
-
-    Raises:
-        InputError: it needs a graph of nodes or has faults of messages.
-    """
+    """Check that a flight needs no graph of nodes and has no faults of messages."""
     flight.check_in_process()
     if flight.flies_by_messages:
         raise InputError(
@@ -66,11 +62,7 @@ def check_for_bench(flight: Flight) -> None:
 
 
 def seeded(flight: Flight, seed: int, name: str = "seed") -> PlantSettings:
-    """Return the settings of a flight's plant with another seed of the random numbers.
-
-    Raises:
-        InputError: the seed is not a whole number from 0 to `LARGEST_SEED`; has its ``name``.
-    """
+    """Return the settings of a flight's plant with another seed of the random numbers."""
     number = as_whole_number(seed, name, 0, LARGEST_SEED)
     return flight.plant_settings.model_copy(update={"fault_seed": number})
 
@@ -86,15 +78,7 @@ class FlightBench(RecordOwner):
     _views = ("_reference",)
 
     def __init__(self, flight: Flight, record: bool = False) -> None:
-        """Put a flight on the bench.
-
-        Args:
-            flight: to be flown.
-            record: keep the commands, for `log`.
-
-        Raises:
-            InputError: the flight needs a graph of nodes or has faults of messages.
-        """
+        """Put a flight on the bench; ``record``: keep the commands, for `log`."""
         check_for_bench(flight)
         self.flight, self.ticks, self.period = flight, flight.ticks, flight.period
         # of its own: a law remembers, and another bench may fly the same flight
@@ -119,11 +103,7 @@ class FlightBench(RecordOwner):
     def reset(self, seed: int | None = None) -> RobotState:
         """Begin the flight anew and return the measured state of tick 0.
 
-        Args:
-            seed: of the random numbers of sensors and faults; None: the flight's own.
-
-        Raises:
-            InputError: the seed is not a whole number from 0 to 2147483647.
+        ``seed``: of the random numbers of sensors and faults, 0 to 2147483647; None: the flight's.
         """
         flight = self.flight
         settings = flight.plant_settings if seed is None else seeded(flight, seed)
@@ -161,10 +141,11 @@ class FlightBench(RecordOwner):
                     history.add(command.torque)
             plant.step(command)
         except FlightError as error:
-            self._end(Ending.early(error, self.period))
+            self._ending = Ending.early(error, self.period)
         else:
             if plant.state.tick >= self.ticks:
-                self._end(Ending.complete(self.ticks, self.period))
+                self._ending = Ending.complete(self.ticks, self.period)
+        self.done = self._ending is not None
         return plant.state
 
     def command(self) -> Command:
@@ -204,11 +185,7 @@ class FlightBench(RecordOwner):
         )
 
     def restore(self, snapshot: Snapshot) -> RobotState:
-        """Restore a snapshot of this scenario; the flight continues bit-identically.
-
-        Raises:
-            InputError: no snapshot, or a snapshot of another scenario.
-        """
+        """Restore a snapshot of this scenario; the flight continues bit-identically."""
         if not isinstance(snapshot, Snapshot):
             raise InputError(f"snapshot: what `save` returned was expected, got {short(snapshot)}")
         here, there = self.flight.scenario.tree, snapshot.scenario
@@ -232,10 +209,6 @@ class FlightBench(RecordOwner):
 
         The recorded commands are flown again for it, unless nothing was flown since the last call.
         The log of a law's own steps has its telemetry.
-
-        Raises:
-            InputError: nothing was flown or recorded; there is no room for the log; or the
-                state reached is not the bench's, whose plant was changed.
         """
         return self._flown().log
 
@@ -296,11 +269,7 @@ class FlightBench(RecordOwner):
         said = self.outcome or "flying"
         return f"<Bench: {self.flight.robot.name}, t = {self.time:.4f} s, {said}>"
 
-    def _end(self, ending: Ending) -> None:
-        self._ending, self.done = ending, True
-
     def _resolve_command(self, torque: ArrayLike) -> Command:
-        """Return the command for numbers given by the user."""
         numbers, torques = as_numbers(torque, "torque"), self._command
         if numbers.shape == self._shape:
             torques.torque[:] = numbers
@@ -313,7 +282,6 @@ class FlightBench(RecordOwner):
         return self.controller.allocate_torque(self._plant.state, numbers)
 
     def _set_reference(self, tick: int) -> None:
-        """Write the reference of a tick into its block."""
         row = tick - self._first
         if not 0 <= row < len(self._desired):
             self._first = tick - tick % REFERENCE_TICKS

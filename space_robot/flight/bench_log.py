@@ -18,9 +18,9 @@ from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.errors import DivergedError, FlightError
 from space_robot_msgs_py.samples import Command
 
-from .closed_loop import measured_ticks
 from .flown_log import ended_early, flight_log, note_assumed_errors
 from .plan import Flight
+from .simulate import measured_ticks
 
 Array = NDArray[np.float64]
 

@@ -68,16 +68,16 @@ class ActuatorLoad(NamedTuple):
 def actuator_load(
     hardware: BaseActuatorSettings, torque: Array, momentum: Array, omega: Array
 ) -> ActuatorLoad:
-    """Return what is asked of actuators that turn a base.
+    """Return what is asked of actuators that turn a base; all on its axes.
 
     Wheels alone share a torque as the allocation does, see `wheel_loads`; thrusters, and thrusters
     with wheels, in the best way.
 
     Args:
         hardware: wheels, thrusters, or both.
-        torque: (K, 3) N m, of the base.
+        torque: (K, 3) N m.
         momentum: (K, 3) N m s, that the base has been given, less `carried_momentum`.
-        omega: (K, 3) rad/s, of the base. All on its axes.
+        omega: (K, 3) rad/s.
     """
     wheels, nothing = hardware.wheels, np.zeros(len(torque))
     if hardware.thruster_count:
@@ -177,9 +177,6 @@ class ThrusterTorques(NamedTuple):
         """Find the half-spaces of thrusters that can give a torque in any direction.
 
         The torques for 1 kg/s are the convex hull of what each thruster gives for it.
-
-        Raises:
-            InputError: they are too unlike one another for that.
         """
         from scipy.spatial import ConvexHull, QhullError  # slow to import
 
@@ -227,7 +224,6 @@ def _half_spaces(torques: Array, low: Array, high: Array) -> Array:
 
 
 def _unlike(vectors: Array) -> Array:
-    """Return vectors (K, 3) as unit vectors, of equal ones the first."""
     unit = unit_rows(vectors)
     _, first = np.unique(np.round(unit, 9), axis=0, return_index=True)
     kept: Array = unit[first]

@@ -57,11 +57,7 @@ class Ending(NamedTuple):
         return {"outcome": self.outcome, "reason": self.reason, "ended_at_s": self.ended_at_s}
 
     def check(self) -> None:
-        """Check that the flight is complete.
-
-        Raises:
-            FlightError: the flight ended early.
-        """
+        """Raise the error that ended the flight early, if one did."""
         if self.error is not None:
             raise self.error
 

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
+from datetime import datetime, timezone
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +18,8 @@ from space_robot_control.controller.tick import NEW
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.bag.recorder import BagRecorder
-from space_robot_msgs_py.errors import MessageError
+from space_robot_msgs_py.config.validation import short
+from space_robot_msgs_py.errors import InputError, MessageError
 from space_robot_msgs_py.samples import Command, RobotState
 from space_robot_msgs_py.wire.codecs import CommandCodec, StateCodec
 from space_robot_msgs_py.wire.stamp_guard import AGREEING
@@ -227,7 +230,6 @@ class MessageLoop:
         plant.step(self._guard.act(tick))
 
     def _stream(self, tick: int) -> None:
-        """Send the reference to the controller as far ahead as the mission does."""
         settings, mission = self._flight.mission_settings, self._flight.mission
         while self._streamed < tick + settings.lead_ticks:
             chunk = mission.chunk(self._streamed, settings.chunk_ticks)
@@ -263,3 +265,47 @@ class MessageLoop:
                 self._commands.decode(message, self._guard.offered)
                 self._exchange.take(tick)
         return stamp
+
+
+def default_bag(flight: Flight) -> Path:
+    """Return ``flights/<controller>_case<case>_<time>`` below the current folder.
+
+    In a namespace its name comes first: two robots may start in the same second.
+    """
+    stamp = datetime.now(timezone.utc).strftime("%Y%m%d-%H%M%S")
+    case = Path(flight.plant_settings.case).stem
+    where = flight.scenario.options.namespace.lstrip("/").replace("/", "_")
+    return Path("flights") / "_".join(
+        filter(None, (where, flight.controller_name, f"case{case}", stamp))
+    )
+
+
+def check_bag_path(path: Path) -> None:
+    """Check that a bag can be made at a path, without creating it.
+
+    Raises:
+        InputError: the path exists, or its nearest existing folder cannot be written.
+    """
+    if _is_taken(path):
+        raise InputError(f"{path}: exists already; a bag is never overwritten")
+    parent = path
+    try:
+        parent = next(p for p in path.absolute().parents if p.exists())
+        with TemporaryDirectory(dir=parent):
+            pass
+    except OSError as error:
+        raise InputError(
+            f"{path}: no bag can be written there ({parent}: {error.strerror})"
+        ) from None
+
+
+def _is_taken(path: Path) -> bool:
+    try:
+        path.lstat()
+    except (FileNotFoundError, NotADirectoryError):
+        return False
+    except OSError as error:
+        raise InputError(f"{path}: no bag can be written there ({error.strerror})") from None
+    except ValueError as error:
+        raise InputError(f"{short(str(path))}: no name of a folder ({error})") from None
+    return True

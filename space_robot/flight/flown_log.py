@@ -57,11 +57,7 @@ def mapped(shape: tuple[int, ...]) -> Array:
 
 
 def check_room(size: int, what: str) -> None:
-    """Check that files of ``size`` bytes fit into the folder for temporary files.
-
-    Raises:
-        InputError: they do not; says so of ``what``.
-    """
+    """Check that files of ``size`` bytes fit into the folder for temporary files."""
     folder = tempfile.gettempdir()
     free = shutil.disk_usage(folder).free
     if size > free:
@@ -123,7 +119,7 @@ def note_assumed_errors(flight: Flight, block: FlightLog, start: int, stop: int)
 
 
 def ended_early(block: FlightLog, measured: int, answered: int) -> FlightLog:
-    """The first ``measured`` rows; those from ``answered`` on have no command."""
+    """Return the first ``measured`` rows; those from ``answered`` on have no command."""
     for column in (block.commanded_torque, block.actuator_commands, block.telemetry):
         if column is not None:
             column[answered:] = np.nan

@@ -108,7 +108,6 @@ def mission_demand(
 
 
 def _off_momentum(robot: Robot, asked: MotionDemand, rate: Array | None) -> Array:
-    """Return the momentum (3,) by which a start with ``rate`` differs from the reference's."""
     if rate is None:
         return np.zeros(3)
     motion = Motion(asked.base[:1, :4], asked.base[:1, 4:7], *asked.joints[:1, :2].swapaxes(0, 1))

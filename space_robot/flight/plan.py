@@ -30,11 +30,7 @@ class Flight:
     """Plant, controller and mission built from a scenario alone."""
 
     def __init__(self, scenario: ResolvedScenario) -> None:
-        """Build the plant, the mission and the controller.
-
-        Raises:
-            InputError: settings conflict.
-        """
+        """Build the plant, the mission and the controller."""
         scenario.reference.check_until(scenario.ticks * scenario.plant.period)
         check_mission_demand(scenario)
         self.scenario = scenario
@@ -84,18 +80,11 @@ class Flight:
         """What answers the states, where the controller has to answer as a node does.
 
         The flight code in C is compiled, or the flight computer greeted, at the first request.
-
-        Raises:
-            InputError: a law cannot be exported, or there is no compiler or no flight computer.
         """
         return supervisor_of(self.controller, list(self.laws.values()), self.controller_settings)
 
     def check_in_process(self) -> None:
-        """Check that the flight can run in one process.
-
-        Raises:
-            InputError: an option needs a graph of nodes.
-        """
+        """Check that the flight can run in one process: no option needs a graph of nodes."""
         plant, faults = self.plant_settings, self.scenario.process_faults
         asked = [f"faults {[str(fault) for fault in faults]}"] if faults else []
         asked += self.scenario.options.graph_options
@@ -128,10 +117,7 @@ class Flight:
 
     @property
     def description(self) -> dict[str, Any]:
-        """Description of the flight for its bag, sufficient to repeat it.
-
-        It depends only on plan and software, not on time or machine.
-        """
+        """Description of the flight for its bag, sufficient to repeat it on any machine."""
         return {
             **self.scenario.description(self.plant),
             **({"start_step": self.start_step} if self.start_step else {}),

@@ -18,11 +18,11 @@ TASKS = ("reach",)
 
 
 def make(task: str, **settings: Any) -> ReachEnv:
-    """Return an environment of Gymnasium for a task.
+    """Return an environment of Gymnasium for the task "reach", see `reach_env.ReachEnv`.
 
     Args:
-        task: "reach": see `space_robot.learning.reach_env.ReachEnv`.
-        settings: of the task, see `space_robot.learning.reach_env.ReachTask`.
+        task: one of `TASKS`.
+        settings: of the task, see `reach_env.ReachTask`.
 
     Raises:
         InputError: there is no such task, or a setting is out of its range.
@@ -42,10 +42,6 @@ def make_vec(task: str, num_envs: int = 8, threads: int = 1, **settings: Any) ->
         num_envs: number of environments; a multiple of 8 fills all lanes.
         threads: among which they are divided.
         settings: see `make`.
-
-    Raises:
-        InputError: there is no such task, or a setting is out of its range.
-        ImportError: Gymnasium is not installed.
     """
     one_of(task, TASKS, "task")
     from .reach_env import ReachVectorEnv  # Gymnasium is an extra

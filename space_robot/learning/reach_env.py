@@ -33,9 +33,9 @@ except ImportError:
     raise ImportError(f"gymnasium is not installed: {install_command('gym')}") from None
 
 from ..api import Scenario
-from ..flight.batch.lane_loop import InLanes
-from ..flight.batch.lane_memory import in_lanes, record_numbers
 from ..flight.compilation import compile_kernels
+from ..flight.lane_loop import InLanes
+from ..flight.lane_memory import in_lanes, record_numbers
 from ..flight.plan import Flight
 from .reach import LARGEST, Reach, observe_start, step_alone, step_in_lanes
 
@@ -72,7 +72,7 @@ class ReachTask:
         """Check the settings.
 
         Args:
-            scenario: robot, case (friction, disturbances) and period; None: the paper's.
+            scenario: robot, case and period; None: the paper's.
             ticks_per_step: ticks for which an action is held.
             duration: of an episode, s.
             torque_scale: torque, N m (prismatic joints: N), of an action of 1; scalar or (m,).
@@ -80,9 +80,8 @@ class ReachTask:
             reach: largest distance of a target from its start, rad or m, each joint.
 
         Raises:
-            InputError: a number is out of its range, or the scenario has what the task has not:
-                an orbit, joints with gears, sensors with errors, delays, faults, events, or a base
-                with hardware.
+            InputError: a number is out of its range, or the scenario has what the task has not, as
+                an orbit, gears, sensors with errors, delays, faults, or a base with hardware.
         """
         scenario = Scenario(controller=None) if scenario is None else scenario
         if not isinstance(scenario, Scenario):
@@ -173,11 +172,7 @@ class ReachEnv(gymnasium.Env[Array, Array]):
     """
 
     def __init__(self, **settings: Any) -> None:
-        """Create an environment; ``settings`` are those of `ReachTask`.
-
-        Raises:
-            InputError: see `ReachTask`.
-        """
+        """Create an environment; ``settings`` are those of `ReachTask`."""
         self.task = _task(settings)
         self.observation_space, self.action_space = _spaces(self.task)
         self._plant, self._reach = self.task.begin.block.copy(), Reach.block(self.task.n)
@@ -192,11 +187,7 @@ class ReachEnv(gymnasium.Env[Array, Array]):
         return self._reach["observation"][0].copy(), {}
 
     def step(self, action: Array) -> tuple[Array, float, bool, bool, Info]:
-        """Apply an action.
-
-        Raises:
-            InputError: the action does not have m numbers, or the episode is over.
-        """
+        """Apply an action; an `InputError` if it has not m numbers, or the episode is over."""
         reach, task = self._reach, self.task
         if not reach["ticks"][0] or reach["has_failed"][0] or reach["tick"][0] >= task.ticks:
             raise InputError("the episode is over, or has not begun: reset the environment")
@@ -222,9 +213,6 @@ class ReachVectorEnv(VectorEnv[Array, Array, Array]):
             num_envs: number of environments; a multiple of 8 fills all lanes.
             threads: among which they are divided; the bits do not depend on it.
             settings: of `ReachTask`.
-
-        Raises:
-            InputError: a number is out of its range; see `ReachTask`.
         """
         self.num_envs = as_whole_number(num_envs, "num_envs", 1, MOST_ENVS)
         self.task = task = _task(settings)
@@ -258,28 +246,21 @@ class ReachVectorEnv(VectorEnv[Array, Array, Array]):
         seed: int | Sequence[int | None] | None = None,
         options: dict[str, Any] | None = None,
     ) -> tuple[Array, Info]:
-        """Start an episode of each environment.
+        """Start an episode of each environment; ``options`` is not used.
 
-        Args:
-            seed: of the first; the next ones have the numbers after it. Or one for each.
-            options: not used.
-
-        Raises:
-            InputError: a seed is not a whole number of 0 or more, or their number is wrong.
+        ``seed``: of the first; the next ones have the numbers after it. Or one for each.
         """
         count = self.num_envs
         if seed is not None or not self._generators:
+            seeds: list[int | None] = [None] * count
             if isinstance(seed, Sequence) and not isinstance(seed, str):
                 if len(seed) != count:
                     raise InputError(f"seed: {count} numbers were expected, got {len(seed)}")
-                names = [f"seed[{k}]" for k in range(count)]
                 seeds = [
-                    None if own is None else as_whole_number(own, name, 0)
-                    for own, name in zip(seed, names, strict=True)
+                    None if own is None else as_whole_number(own, f"seed[{k}]", 0)
+                    for k, own in enumerate(seed)
                 ]
-            elif seed is None:
-                seeds = [None] * count
-            else:
+            elif seed is not None:
                 first = as_whole_number(seed, "seed", 0)
                 seeds = [first + k for k in range(count)]
             self._generators = [gymnasium.utils.seeding.np_random(own)[0] for own in seeds]
@@ -287,11 +268,7 @@ class ReachVectorEnv(VectorEnv[Array, Array, Array]):
         return self._observations[: self.num_envs].copy(), {}
 
     def step(self, actions: Array) -> tuple[Array, Array, Array, Array, Info]:
-        """Apply an action (num_envs, m) of each environment.
-
-        Raises:
-            InputError: the actions have another shape, or `reset` was not called.
-        """
+        """Apply an action (num_envs, m) of each environment."""
         if not self._generators:
             raise InputError("reset the environments before the first step")
         count = self.num_envs
@@ -311,7 +288,6 @@ class ReachVectorEnv(VectorEnv[Array, Array, Array]):
         return self._observations[:count].copy(), rewards, failed > 0.0, truncated > 0.0, {}
 
     def _threads(self) -> ThreadPoolExecutor:
-        """Return the threads of this process."""
         if self._pool is None or self._pool_process != os.getpid():
             self._pool, self._pool_process = ThreadPoolExecutor(len(self._parts)), os.getpid()
         return self._pool
@@ -342,7 +318,6 @@ class ReachVectorEnv(VectorEnv[Array, Array, Array]):
         self._results[:, part] = results
 
     def _start(self, numbers: Any) -> None:
-        """Begin an episode of some environments."""
         plant, reach = self._begin
         for k in numbers:
             self.task.put(self.task.episode(self._generators[k]), plant, reach)
@@ -370,7 +345,6 @@ def _checked(action: Any, shape: tuple[int, ...]) -> Array:
 
 
 def _work_of(plant: Plant) -> InLanes:
-    """Return memory for eight copies of a plant."""
     records = in_lanes(PlantMemory, len(plant.names.joints))
     records.alone[:] = plant.block
     records.numbers[:] = records.numbers_alone.T

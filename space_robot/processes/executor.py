@@ -1,9 +1,7 @@
 """Run a function over many items: in this process, in worker processes, or on a Dask cluster.
 
 Each worker process is a `ProcessPoolExecutor` of its own, since the death of a worker breaks its
-whole executor: so it is known whose item it was, and the items of others go on. What is waited for,
-and how long: for results, with ``timeout_s`` no longer than until an item's time is up; for a
-cluster's scheduler `CONNECT_S`, for its workers `WORKERS_S`.
+whole executor: so it is known whose item it was, and the items of others go on.
 """
 
 from __future__ import annotations
@@ -30,7 +28,7 @@ from space_robot_msgs_py.config.installation import install_command
 from space_robot_msgs_py.config.text import one_line_of
 from space_robot_msgs_py.errors import InputError, SpaceRobotError
 
-from .memory import COLLECTED_AT
+from . import COLLECTED_AT
 from .software import versions
 
 if TYPE_CHECKING:
@@ -89,15 +87,15 @@ def run_many(
     """Yield the outcome of every item, in order of completion.
 
     Closing the iterator ends the processes; whatever ends this process ends them, too. Items are
-    taken as workers need them, so memory does not grow with their number.
+    taken as workers need them.
 
     Args:
-        function: called with each item; it and the items are pickled unless ``workers`` is 0.
+        function: called with each item; both are pickled unless ``workers`` is 0.
         items: taken one after the other.
         workers: number of processes; 0: the function is called in this process.
         scheduler: address of a Dask scheduler, whose workers are used instead of ``workers``.
-        timeout_s: longest time for an item (None: any). Its process is then killed; on a cluster
-            the function is interrupted as soon as it is in Python code.
+        timeout_s: longest time for an item; its process is then killed, on a cluster the function
+            is interrupted as soon as it is in Python code.
 
     Raises:
         InputError: an argument is invalid, or the scheduler does not answer.
@@ -124,13 +122,9 @@ def run_all(
     workers: int,
     progress: Callable[[int], Callable[[], None]] = lambda total: lambda: None,
 ) -> list[Result]:
-    """Return the results of all items in their order, or raise the first error.
+    """Return the results of all items, hashable ones, in their order, or raise the first error.
 
-    Args:
-        function: see `run_many`.
-        items: hashable and different ones.
-        workers: see `run_many`.
-        progress: called with the number of items, gives what is called after each.
+    ``progress``: called with the number of items, gives what is called after each.
     """
     results = {}
     with closing(run_many(function, items, workers=workers)) as running:
@@ -168,8 +162,6 @@ def _in_this_process(
 
 
 class _Worker:
-    """A process that works on one item at a time."""
-
     def __init__(self) -> None:
         start_fork_server()
         context = multiprocessing.get_context("forkserver")
@@ -297,11 +289,7 @@ def _in_processes(
 
 
 def check_scheduler(address: str) -> None:
-    """Check that a scheduler answers at an address.
-
-    Raises:
-        InputError: there is none, or no client here.
-    """
+    """Check that a scheduler answers at an address; else raise `InputError`."""
     with _connected(address):
         pass
 
@@ -363,18 +351,11 @@ _one_at_a_time = threading.Lock()
 
 @dataclass(frozen=True)
 class _ClusterTask:
-    """Calls a function on a Dask worker, one item at a time whatever its number of threads."""
-
     function: Callable[[Any], Any]
     timeout_s: float | None
     versions: dict[str, str | None]
 
     def __call__(self, item: Any) -> tuple[Any, Exception | None]:
-        """Return result and error.
-
-        Raises:
-            SpaceRobotError: the worker has other versions than the client.
-        """
         here = versions()
         for name, version in self.versions.items():
             if here.get(name) != version:
@@ -409,7 +390,6 @@ def _interrupted_after(timeout_s: float | None) -> Iterator[None]:
 
 @contextmanager
 def _connected(address: str) -> Iterator[Client]:
-    """Return a client of the scheduler at an address."""
     try:
         from distributed import Client
     except ImportError:

@@ -1,13 +1,10 @@
 """Fork server: forks preloaded child processes and reports their exit codes.
 
 It has imported the modules and compiled kernels that they need, so that one begins within a few
-milliseconds. A process with threads must not fork: a lock that a thread holds stays locked in the
-child for good. Progress bars, notebooks, clusters and ROS run threads in the user's process, so
-that one forks only once, at the beginning, or starts the server as a program of its own
-(`ForkServer.of_module`); the server never has a thread.
-
-The server of `multiprocessing` does not serve here: its children import the user's main module
-again, a function must be pickled to reach them, and it looks for modules in the current folder.
+milliseconds. A process with threads must not fork, since a lock that a thread holds stays locked in
+the child; progress bars, notebooks, clusters and ROS run threads in the user's process. The server
+of `multiprocessing` does not serve here: its children import the user's main module again, and it
+looks for modules in the current folder.
 """
 
 from __future__ import annotations
@@ -33,8 +30,6 @@ TIMEOUT_S = 60.0
 """Longest wait for an answer of the server, which normally takes milliseconds."""
 CHECK_S = 5.0
 """Interval in which the server checks that its client process still runs."""
-UNKNOWN = b"?"
-"""The exit code of a child that another server had forked."""
 RUNS = b"-"
 """The exit code of a child that has not ended."""
 MOST_DESCRIPTORS = 4
@@ -55,20 +50,6 @@ class ForkServer:
         self._lock, self._has_forked = threading.Lock(), False
         with theirs:
             self._pid = start(theirs, self._socket)
-
-    @classmethod
-    def of_this_process(cls, target: Target) -> ForkServer:
-        """Fork the server from this process; ``target`` is not pickled."""
-
-        def start(theirs: socket.socket, ours: socket.socket) -> int:
-            def begin() -> None:
-                ours.close()
-                serve(theirs, target, starter)
-
-            starter = os.getpid()
-            return fork(begin)
-
-        return cls(start)
 
     @classmethod
     def of_module(cls, module: str) -> ForkServer:
@@ -105,18 +86,8 @@ class ForkServer:
         Raises:
             OSError: the server is gone.
         """
-        reply = self._ask(f"look {pid}".encode())
+        reply = self._ask(str(pid).encode())
         return None if reply == RUNS else int(reply)
-
-    def end(self, pid: int) -> int | None:
-        """Kill a child if it still runs; return its exit code, below zero for a signal's number.
-
-        None: the server that forked it is gone.
-        """
-        with suppress(OSError):
-            reply = self._ask(f"end {pid}".encode())
-            return None if reply == UNKNOWN else int(reply)
-        return None
 
     def close(self) -> None:
         """End the server and all its children."""
@@ -171,17 +142,17 @@ def serve(end: socket.socket, target: Target, starter: int) -> None:
         if request == b"fork":
             end.send(str(_forked_child(end, target, children, descriptors)).encode())
         else:
-            verb, number = request.split()
-            end.send(_exit_code(children, int(number), is_killed=verb == b"end"))
-    for pid in children:
-        _exit_code(children, pid, is_killed=True)
+            code = _exit_code(children, int(request))
+            end.send(RUNS if code is None else str(code).encode())
+    for pid, code in children.items():
+        if code is None:
+            os.kill(pid, signal.SIGKILL)
+            os.waitpid(pid, 0)
 
 
 def _forked_child(
     end: socket.socket, target: Target, children: dict[int, int | None], descriptors: Sequence[int]
 ) -> int:
-    """Return a new child's pid, or the negative number of the system's error."""
-
     def begin() -> None:
         end.close()
         target(Connection(descriptors[0]), descriptors[1:], server)
@@ -198,18 +169,12 @@ def _forked_child(
     return pid
 
 
-def _exit_code(children: dict[int, int | None], pid: int, *, is_killed: bool) -> bytes:
-    """Return the exit code of a child, kept from the first query."""
-    if pid not in children:
-        return UNKNOWN
+def _exit_code(children: dict[int, int | None], pid: int) -> int | None:
     if children[pid] is None:
-        if is_killed:
-            os.kill(pid, signal.SIGKILL)
-        ended, status = os.waitpid(pid, 0 if is_killed else os.WNOHANG)
+        ended, status = os.waitpid(pid, os.WNOHANG)
         if ended:
             children[pid] = os.waitstatus_to_exitcode(status)
-    code = children[pid]
-    return RUNS if code is None else str(code).encode()
+    return children[pid]
 
 
 def fork(target: Callable[[], None]) -> int:

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import signal
+import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
+
+from space_robot_msgs_py.ros.process import clean_environment, lifeline
 
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT)
 QUIET_S = 2.0
@@ -86,3 +89,19 @@ def handled_signals(handler: Callable[[int, Any], None]) -> Iterator[None]:
     finally:
         for number, before in previous.items():
             signal.signal(number, before)
+
+
+@contextmanager
+def child_process(command: Sequence[str], **options: Any) -> Iterator[subprocess.Popen[bytes]]:
+    """Start a process that ends with the context or this process; ``options``: of `Popen`.
+
+    It must be one that holds to its standard input, see `hold_to_standard_input`.
+    """
+    environment = {**clean_environment(), **lifeline(), **options.pop("env", {})}
+    with subprocess.Popen(
+        command, stdin=subprocess.PIPE, env=environment, start_new_session=True, **options
+    ) as process:
+        try:
+            yield process
+        finally:
+            process.terminate()

@@ -1,7 +1,7 @@
 """Catalogue of all kinds of faults, including faults of node processes.
 
 The plant's faults stand beside what they spoil; a process is killed or stopped by the orchestrator
-(`space_robot.flight.graph.watch`).
+(`space_robot.flight.graph.following`).
 """
 
 from __future__ import annotations

@@ -30,9 +30,8 @@ from space_robot_sim.environment.events import Capture
 from space_robot_sim.environment.neighbouring_orbit import target_state
 from space_robot_sim.plant.settings import PLANT_KINDS, PlantNodeSettings
 
-from .disturbances import table_parameters
 from .objects import NODES as NODES
-from .objects import AnyLaw, resolve_law, robot_setting
+from .objects import AnyLaw, resolve_law, robot_setting, table_parameters
 from .options import OPTIONS
 from .scenario import NO_FRICTION, Scenario
 
@@ -108,7 +107,6 @@ class FlightSettings:
 def _controller(
     chosen: Tree, plant: PlantNodeSettings
 ) -> tuple[ControllerNodeSettings, dict[str, Tree]]:
-    """Resolve the controller's settings and the gains given by law; defaults are the plant's."""
     own, gains = split_gains(chosen)
     own.setdefault("actuators", plant.actuators)
     if plant.realtime:  # by the wall clock there is no time to wait
@@ -153,10 +151,6 @@ def with_assumed_orbit(
 
 
 def _at_pointing_start(plant: PlantNodeSettings, mission: MissionNodeSettings) -> PlantNodeSettings:
-    """Return a plant's settings that begin where the reference does, if that begins by pointing.
-
-    Attitude or rate that are given stay.
-    """
     if not mission.base_point.strip():
         return plant
     try:
@@ -171,7 +165,6 @@ def _at_pointing_start(plant: PlantNodeSettings, mission: MissionNodeSettings) -
 
 
 def _check_may_be_set(parameters: Mapping[str, Mapping[str, Any]]) -> None:
-    """Check that the nodes exist and that no parameter is set by the flight itself."""
     for node, values in parameters.items():
         one_of(node, NODES, "node", " in parameters")
         for name, _ in flatten(nest(values)):
@@ -231,7 +224,6 @@ def option_parameters(scenario: Scenario) -> dict[str, dict[str, Any]]:
 
 
 def _law_parameter(law: str | AnyLaw | None) -> str:
-    """Return what the parameter ``controller`` says; `importable_name` of a law not shipped."""
     if law is None or isinstance(law, str):
         return law or ""
     kind = law if isclass(law) else type(law)
@@ -239,10 +231,6 @@ def _law_parameter(law: str | AnyLaw | None) -> str:
 
 
 def _mission(mission: str | Tree) -> tuple[str, Tree, Tree]:
-    """Return the file's name, and the settings for mission and plant.
-
-    Unless it is given too, the plant begins at the mission's start.
-    """
     if isinstance(mission, str):
         return mission, {}, {}
     if "start" in mission:
@@ -258,7 +246,6 @@ def _mission(mission: str | Tree) -> tuple[str, Tree, Tree]:
 
 
 def _gains(gains: str | Tree, law: str | AnyLaw | None) -> tuple[str, Tree]:
-    """Return the name of the set, and the gains that override it as ``<law>.<gain>``."""
     if isinstance(gains, str):
         return gains, {}
     if not any(isinstance(value, dict) for value in gains.values()):

@@ -5,12 +5,14 @@ Values are kept as they are given; numbers that are given stand over no file: it
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+import math
+from collections.abc import Callable, Mapping, Sequence
 from inspect import isabstract, isclass
 from pathlib import PurePath
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 from pydantic import BaseModel, ByteSize, TypeAdapter, ValidationError
 
 from space_robot_control.controller.law_choice import law_of
@@ -21,6 +23,7 @@ from space_robot_model.hardware.sensors import SensorSettings
 from space_robot_model.robot import Robot
 from space_robot_model.robot.find import ROBOTS, robot_as_path
 from space_robot_model.robot.mission_document import OF_PLANT, document_settings
+from space_robot_msgs_py.config.arguments import as_positive
 from space_robot_msgs_py.config.files import GIVEN, Tree, flatten, is_named, nest
 from space_robot_msgs_py.config.validation import (
     StrictModel,
@@ -32,18 +35,16 @@ from space_robot_msgs_py.config.validation import (
 from space_robot_msgs_py.config.yaml_text import YamlTextError, parse_yaml
 from space_robot_msgs_py.errors import InputError
 from space_robot_sim.actuators.actuators import ActuatorSettings
+from space_robot_sim.environment.disturbance_table import BASE, TIME, DisturbanceTable
 from space_robot_sim.environment.environment import EnvironmentSettings
 from space_robot_sim.environment.events import Capture, Release
 from space_robot_sim.environment.orbit import OrbitSettings
-
-from .disturbances import as_disturbance
 
 NODES = ("plant", "controller", "mission", "recorder")
 AnyLaw = type[ControlLaw] | ControlLaw
 
 
 def _name(value: Any, otherwise: str) -> str:
-    """Return the text of a name or a path; a number may stand for a name."""
     is_name = isinstance(value, (str, PurePath, int, float)) and not isinstance(value, bool)
     if not is_name or "\0" in str(value):
         raise ValueError(f"a name, a path or {otherwise} was expected")
@@ -51,21 +52,18 @@ def _name(value: Any, otherwise: str) -> str:
 
 
 def _plain(value: Any) -> Any:
-    """Return a copy made of mappings, lists, numbers and texts, as in a file."""
     if isinstance(value, BaseModel):
         return value.model_dump()
     if isinstance(value, (Capture, Release)):
         return str(value)
     if isinstance(value, Mapping):
         return {str(key): _plain(inner) for key, inner in value.items()}
-    if isinstance(value, (np.ndarray, np.generic)):
+    if hasattr(value, "tolist"):
         return value.tolist()
-    return [_plain(inner) for inner in value] if isinstance(value, (list, tuple)) else value
+    return [_plain(inner) for inner in value] if isinstance(value, (list, tuple, range)) else value
 
 
 def _settings(schema: type[StrictModel], more: tuple[str, ...] = ()) -> Callable[[Any], Any]:
-    """Accept a name, or settings of a ``schema``: an object or a mapping, with ``more`` keys."""
-
     def check(value: Any) -> str | Tree:
         if not isinstance(value, (Mapping, BaseModel)):
             return _name(value, f"{schema.__name__} (an object or a mapping)")
@@ -80,7 +78,6 @@ def _settings(schema: type[StrictModel], more: tuple[str, ...] = ()) -> Callable
 
 
 def _mission(value: Any) -> str | Tree:
-    """Accept a name, settings of a mission, or the content of its document."""
     if isinstance(value, Mapping) and "start" in (tree := nest(_plain(value))):
         document_settings(tree, "mission")
         return tree
@@ -114,7 +111,6 @@ def _gains(value: Any) -> str | Tree:
 
 
 def _listed(gains: Any) -> Any:
-    """Convert a number to a list of one, which applies to all axes."""
     if isinstance(gains, dict):
         return {name: _listed(value) for name, value in gains.items()}
     return gains if isinstance(gains, list) else [gains]
@@ -128,7 +124,6 @@ def _size(value: Any) -> int:
 
 
 def _parameters(value: Any) -> dict[str, Tree]:
-    """Accept parameters by node and name, as nested mappings too, or texts as of ``--set``."""
     parameters: dict[str, Tree] = {}
     if isinstance(value, list) and all(isinstance(text, str) for text in value):
         for text in value:
@@ -154,6 +149,74 @@ def set_parameter(parameters: dict[str, Tree], text: str, where: str) -> None:
     except YamlTextError as error:
         raise InputError(f"{where} {short(name)}: {error}") from None
     parameters.setdefault(node, {}).update(flatten({parameter: parsed}))
+
+
+PERIOD_S = 0.01
+"""Period at which a function is sampled, s."""
+Columns = dict[str, list[float]]
+Load = Callable[[float], Mapping[str, float] | ArrayLike]
+
+
+def sampled(function: Load, duration: float, period: float = PERIOD_S) -> Columns:
+    """Return the columns of a disturbance that is given as a function of time.
+
+        sr.Scenario(disturbance=sr.sampled(lambda t: {"base_torque_z": 0.1 * t}, duration=5.0))
+
+    Args:
+        function: of the time (s); returns numbers by column, see `DisturbanceTable`, or 6 numbers:
+            force (N) and torque (N m) on the base, base frame.
+        duration: s; the last row is at or just after it.
+        period: s between two rows, between which the numbers are linear.
+    """
+    duration, period = as_positive(duration, "duration"), as_positive(period, "period")
+    count = math.ceil(duration / period - 1e-6) + 1
+    times = [k * period for k in range(count)]
+    rows = [_row(function(time), time) for time in times]
+    names = list(dict.fromkeys(name for row in rows for name in row))
+    columns = {TIME: times, **{name: [row.get(name, 0.0) for row in rows] for name in names}}
+    return DisturbanceTable.of(columns, "disturbance").columns
+
+
+def as_disturbance(value: Any) -> str | Columns | Load:
+    """Accept a path, columns or a function, or raise `ValueError` for pydantic."""
+    if isinstance(value, Mapping):
+        columns = {str(name): _plain(numbers) for name, numbers in value.items()}
+        return DisturbanceTable.of(columns, "columns").columns
+    if callable(value) and not isclass(value):
+        function: Load = value
+        return function
+    if isinstance(value, str) or hasattr(value, "__fspath__"):
+        return str(value)
+    raise ValueError("a CSV or Parquet file, columns (a mapping) or a function was expected")
+
+
+def table_parameters(disturbance: str | Columns | Load) -> dict[str, str]:
+    """Return the parameter of the plant for an option; none of a function, which is sampled."""
+    if callable(disturbance) or not disturbance:
+        return {}
+    if isinstance(disturbance, str):
+        return {"disturbance.table": disturbance}
+    return {"disturbance.table": DisturbanceTable(disturbance).text}
+
+
+def _row(value: Any, time: float) -> dict[str, float]:
+    returned = f"disturbance: the function returned {short(value)}"
+    is_list = isinstance(value, Sequence) and not isinstance(value, str)
+    is_array = isinstance(value, np.ndarray) and value.ndim > 0
+    if (is_list or is_array) and len(value) == len(BASE):
+        value = dict(zip(BASE, value, strict=True))
+    if not isinstance(value, Mapping):
+        raise InputError(
+            f"{returned} at {time:g} s; a mapping of numbers by column, or {len(BASE)} numbers "
+            f"({', '.join(BASE)}), was expected"
+        )
+    row = {}
+    for name, number in value.items():
+        is_number = isinstance(number, (int, float)) or getattr(number, "shape", 0) == ()
+        row[str(name)] = float(number) if is_number and np.isrealobj(number) else math.nan
+        if not math.isfinite(row[str(name)]):
+            raise InputError(f"{returned} at {time:g} s; a number was expected for {name}")
+    return row
 
 
 CONVERTERS: Mapping[str, Callable[[Any], Any]] = {

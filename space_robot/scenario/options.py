@@ -235,7 +235,6 @@ OPTIONS: dict[str, Option] = {}
 
 
 def _read_fields() -> None:
-    """Collect the options, and leave their defaults in their places."""
     for name, hint in get_type_hints(Options).items():
         Options.__annotations__[name] = hint
         if isinstance(option := vars(Options)[name], Option):

@@ -20,13 +20,11 @@ from space_robot_msgs_py.errors import InputError, explained_by
 from space_robot_sim.environment.disturbance_table import JSON, DisturbanceTable
 from space_robot_sim.faults.grammar import Fault, parse_faults
 
-from .disturbances import sampled
 from .faults import KINDS, NODE_OF, PROCESS_KINDS
 from .node_settings import FlightSettings, option_parameters
-from .objects import resolve_law
+from .objects import resolve_law, sampled
 from .options import OPTIONS
-from .resolved import ResolvedScenario
-from .robots import Robots
+from .resolved import ResolvedScenario, Robots
 from .scenario import Scenario
 
 
@@ -34,9 +32,6 @@ def resolve(scenario: Scenario) -> ResolvedScenario:
     """Read all files that the options name, and check that they fit together.
 
     Single parameters of nodes override the other options.
-
-    Raises:
-        InputError: a name does not exist, or settings conflict.
     """
     with explained_by("disturbances"):
         faults = parse_faults(scenario.faults_of(PROCESS_KINDS), KINDS)
@@ -67,7 +62,6 @@ def resolve(scenario: Scenario) -> ResolvedScenario:
 
 
 def _check_nodes(scenario: Scenario, faults: list[Fault]) -> None:
-    """Check what is asked of nodes that are not started, or have no process of their own."""
     for node in scenario.without:
         asked = [
             name
@@ -102,7 +96,6 @@ def _with_sampled_disturbance(scenario: ResolvedScenario) -> ResolvedScenario:
 
 
 def _mission(settings: FlightSettings, robot: Robot) -> Mission:
-    """Build the mission; errors name its file."""
     with explained_by("own-trajectory"):
         try:
             return Mission(robot, settings.mission, settings.plant.period)
@@ -150,7 +143,6 @@ def _assumed_actuators(
 
 @explained_by("disturbances")
 def _check_disturbance(scenario: ResolvedScenario) -> None:
-    """Check the columns of a file that was given, which the plant does not know, for the robot."""
     if not (text := scenario.plant.disturbance.table):
         return
     parameters = option_parameters(scenario.options)["plant"]

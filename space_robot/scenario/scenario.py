@@ -51,11 +51,7 @@ class Scenario(StrictModel, Options):
         return value if is_absent or name not in CONVERTERS else CONVERTERS[name](value)
 
     def replace(self, **options: Any) -> Self:
-        """Return a copy of the scenario with these options changed.
-
-        Raises:
-            InputError: an unknown option, or one of a wrong type.
-        """
+        """Return a copy of the scenario with these options changed."""
         return type(self)(**{**self.given, **options})
 
     @property
@@ -93,7 +89,6 @@ class Scenario(StrictModel, Options):
         return self.model_copy(update={"parameters": parameters})
 
     def _repr_html_(self) -> str:
-        """Show the options that were set in a notebook."""
         rows = [[name, _text(value), _default(name)] for name, value in self.given.items()]
         caption = "Scenario" if rows else "Scenario: all options have their defaults"
         return html_table(("option", "value", "default"), rows, caption)
@@ -106,7 +101,6 @@ class Scenario(StrictModel, Options):
 
 
 def _text(value: object) -> str:
-    """Return a value as text: of a robot or a law its name."""
     if isinstance(value, str):
         return value
     name = getattr(value, "name", None) or getattr(value, "__name__", None)

@@ -35,7 +35,7 @@ from matrix.scenarios import (
 )
 from space_robot import FlownFlight
 from space_robot.analysis.words import of_statistic
-from space_robot.flight.batch.batch import FlightBatch, batches
+from space_robot.flight.batch import FlightBatch, batches
 from space_robot.flight.plan import Flight
 from space_robot_msgs_py.bag.reader import read_flight
 from space_robot_msgs_py.compiled.lanes import WIDTH

@@ -14,8 +14,8 @@ from plant import elapsed, flight_of, moving_plant, ticks_in_lanes
 import space_robot as sr
 from space_robot.analysis import analyze
 from space_robot.campaign.study import Study
-from space_robot.flight.batch.compilation import compile_lanes
-from space_robot.flight.batch.lane_memory import in_lanes
+from space_robot.flight.compilation import compile_lanes
+from space_robot.flight.lane_memory import in_lanes
 from space_robot.flight.simulate import simulate as fly
 from space_robot_msgs_py.compiled.lanes import WIDTH
 from space_robot_sim.plant.tick import PlantMemory

@@ -21,7 +21,7 @@ from space_robot.flight.graph import orchestrator
 from space_robot.flight.graph.domain import ros_domain
 from space_robot.flight.graph.node_server import Program
 from space_robot.flight.graph.processes import Command, Graph, node_environment, ros_arguments
-from space_robot.processes.node_modules import MODULES
+from space_robot.processes import MODULES
 from space_robot_msgs_py import topics
 
 LOCKSTEP_S, COMPOSED_CLOCK_S, CLOCK_S = 10.0, 30.0, 60.0

@@ -14,7 +14,7 @@ from measuring import Competitor, Row, Run, repeated, timed
 from scipy import optimize
 
 from space_robot import Scenario
-from space_robot.flight.batch.batch import FlightBatch
+from space_robot.flight.batch import FlightBatch
 from space_robot.flight.plan import Flight, resolve
 from space_robot.flight.simulate import simulate
 from space_robot_control.controller.controller import Controller

@@ -20,7 +20,7 @@ import psutil
 
 from space_robot.flight.graph.domain import ros_domain
 from space_robot.flight.graph.monitor import Monitor
-from space_robot.processes.node_modules import MODULES
+from space_robot.processes import MODULES
 from space_robot_msgs_py.bag.folder import open_bag
 from space_robot_msgs_py.bag.reader import read_flight
 from space_robot_msgs_py.errors import SpaceRobotError

@@ -11,9 +11,8 @@ from space_robot_msgs_py.config.text import printable
 from space_robot_msgs_py.errors import FlightError, InputError
 
 from ...analysis.own_metric import check_names, function_of, of_mapping
-from ...flight.batch.batch import batch_obstacle
-from ...flight.batch.compilation import compile_lanes
-from ...flight.compilation import compile_kernels
+from ...flight.batch import batch_obstacle
+from ...flight.compilation import compile_kernels, compile_lanes
 from ...flight.plan import Flight
 from ...flight.simulate import simulate
 from ...processes.executor import run_many

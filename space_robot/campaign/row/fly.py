@@ -11,7 +11,7 @@ from space_robot_msgs_py.config.text import one_line_of
 from space_robot_msgs_py.errors import FlightError, InputError, SpaceRobotError
 
 from ...analysis.own_metric import MetricError, of_mapping
-from ...flight.batch.batch import FlightBatch, batches
+from ...flight.batch import FlightBatch, batches
 from ...flight.ending import FAILED, Ending
 from ...flight.plan import Flight
 from ...flight.simulate import simulate

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from contextlib import suppress
 
-from ...flight.batch.compilation import load_lanes
+from ...flight.compilation import load_lanes
 from . import fly as fly
 
 with suppress(Exception):  # whatever is wrong is told by the worker that needs it

@@ -83,7 +83,6 @@ def _free_domain(namespace: str) -> tuple[int, FileLock]:
 
 
 def _take(domain: int, namespace: str, welcome: Collection[str]) -> FileLock | None:
-    """Lock a domain chosen by the user; return None if this process holds it already."""
     if (domain, namespace) in _held:
         return None
     try:
@@ -99,7 +98,6 @@ def _take(domain: int, namespace: str, welcome: Collection[str]) -> FileLock | N
 
 
 def _refuse_occupied(domain: int, namespace: str, welcome: Collection[str]) -> None:
-    """Refuse foreign nodes; wait for nodes that end because their parent was killed."""
     until = time.monotonic() + TIMEOUT_S
     while nodes := [
         node for node in nodes_in(domain, namespace) if node.name.split()[0] not in welcome
@@ -135,11 +133,6 @@ def is_quiet(domain: int) -> bool:
 
 
 def _ports_in_use(domain: int) -> bool:
-    """Return True if a port of the domain is in use on this machine.
-
-    Raises:
-        OSError: the tables of ports cannot be read.
-    """
     first = PORT_BASE + PORTS * domain
     lines = [line for file in UDP_TABLES for line in file.read_text("ascii").splitlines()[1:]]
     ports = (int(line.split()[1].rpartition(":")[2], 16) for line in lines)
@@ -179,7 +172,6 @@ def refuse_publishers(
 
 
 def _is_alive(pid: int) -> bool:
-    """Return True if a process runs and is not a zombie (state Z)."""
     try:
         stat = Path(f"/proc/{pid}/stat").read_text("utf-8", errors="replace")
     except OSError:
@@ -188,7 +180,6 @@ def _is_alive(pid: int) -> bool:
 
 
 def _in_use(domain: int) -> bool:
-    """Return True if a port of the domain is in use, at least its first unicast port."""
     with suppress(OSError):
         return _ports_in_use(domain)
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:

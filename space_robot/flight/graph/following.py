@@ -1,68 +1,62 @@
-"""Follow a graph of nodes through a flight: activate, monitor, show, stop."""
+"""Follow a graph of nodes through a flight: activate, monitor, inject faults, show, stop."""
 
 from __future__ import annotations
 
+import math
+import signal
 import time
-from collections.abc import Collection, Mapping, Sequence
-from functools import partial
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 from space_robot_msgs_py.errors import FlightError
+from space_robot_sim.faults.grammar import Fault
 from space_robot_sim.plant.pacing import PAUSED
 
 from ...console.progress import FlightProgress, flight_progress
 from ...processes.interruption import exit_code
-from ...scenario.faults import NODE_OF
+from ...scenario.faults import KILLS, NODE_OF
 from ..plan import Flight
 from .domain import refuse_publishers
 from .monitor import Event, Monitor
 from .node_names import PLANT, OwnNodes, published_topics, started_nodes, wait_for
 from .node_services import change_state
-from .processes import Command, Graph, node_command
-from .watch import Injector, Watch
+from .processes import Graph, NodeProcess, node_command
 
 POLL_S = 0.1
 INJECTING_POLL_S = 0.01
 STALL_TIMEOUT_S = 60.0
 LISTENER_TIMEOUT_S = 5.0
 """Longest wait of a restarted controller for its listeners, s."""
-
-
+HUNG_S = 2.0
+"""Silence after which a controller counts as hung; diagnostics arrive every second."""
+MOST_RESTARTS = 20
 MISSION_FAULTS = frozenset({"kill_mission", "stop_mission"})
 NOT_USED = "rejected: reference: "
 """Beginning of the counts of references that a node could not use."""
 
 
-class Degradation(NamedTuple):
-    """Failures and warnings of a flight, as one-line texts."""
-
-    failures: list[str]
-    """Reasons why the flight differs from the plan."""
-    warnings: list[str]
-    """Anomalies without consequences."""
-
-
 def degradation(
     nodes: Mapping[str, Mapping[str, str]], fault_kinds: frozenset[str], realtime: bool
-) -> Degradation:
-    """Return the degradations of a flight.
+) -> tuple[list[str], list[str]]:
+    """Return why a flight differs from the plan, and anomalies without consequences, as texts.
 
     A reference that was held is another motion than the mission's. In lockstep nothing but a fault
     of the mission can bring that about; by the wall clock any delay can.
     """
-    degraded = Degradation([], [])
+    failures: list[str] = []
+    warnings: list[str] = []
     for node, values in nodes.items():
         held = int(values.get("references_held", 0))
         if held and not fault_kinds & MISSION_FAULTS:
             text = f"{node} held the reference for {held} ticks, for the mission's did not come"
-            (degraded.warnings if realtime else degraded.failures).append(text)
-        degraded.warnings.extend(
+            (warnings if realtime else failures).append(text)
+        warnings += [
             f"{node} {key}: {count} messages"
             for key, count in values.items()
             if key.startswith(NOT_USED)
-        )
-    return degraded
+        ]
+    return failures, warnings
 
 
 class InterruptedFlightError(FlightError):
@@ -86,7 +80,7 @@ def follow(
     """Fly on started nodes until the plant ends the flight; return a report."""
     monitor = Monitor(domain, flight.scenario.options.namespace, period=flight.period)
     try:
-        follower = _Follower(graph, flight, parameters, monitor, folder, stopped)
+        follower = _Follower(graph, flight, parameters["controller"], monitor, folder, stopped)
         with flight_progress(follower.total_s, flight.controller_name) as show:
             follower.bring_up(show, is_empty)
             follower.until_complete(show)
@@ -96,11 +90,18 @@ def follow(
 
 
 class _Follower:
+    """Keeps a flight going where possible.
+
+    Without its plant a flight is over. A controller is restarted if that is wanted. Without
+    recorder or mission the flight goes on: the one costs the bag's end, without the other the last
+    point of the reference is held.
+    """
+
     def __init__(
         self,
         graph: Graph,
         flight: Flight,
-        parameters: dict[str, dict[str, Any]],
+        controller_parameters: Mapping[str, Any],
         monitor: Monitor,
         folder: Path,
         stopped: list[int],
@@ -110,36 +111,31 @@ class _Follower:
         self.total_s = flight.ticks * flight.period
         self._last_clock_s = self.total_s - flight.plant_settings.clock_decimation * flight.period
         self._graph, self._monitor, self._stopped = graph, monitor, stopped
-        options = flight.scenario.options
+        self._flight, self._folder = flight, folder
+        self._controller_parameters = controller_parameters
+        self._options = options = flight.scenario.options
         self._names = started_nodes(options.without)
         self._joined_at = time.monotonic()
-        self._topics_of_others = published_topics(options.without)
         self._own = OwnNodes(monitor.node, options.without, options.join_timeout)
-        self._fault_kinds = frozenset(fault.kind.name for fault in flight.scenario.process_faults)
-        self._realtime = flight.plant_settings.realtime
-        self._injector = Injector(flight.scenario.process_faults, graph)
-        self._watch = Watch(
-            graph,
-            monitor,
-            planned=frozenset(NODE_OF[fault.kind] for fault in flight.scenario.process_faults),
-            restart_command=(
-                partial(_restart_command, parameters["controller"], options.namespace, folder)
-                if flight.scenario.options.restart_controller
-                else None
-            ),
-            last_tick=flight.ticks,
-        )
+        faults = flight.scenario.process_faults
+        self._injector = Injector(faults, graph)
+        self._fault_kinds = frozenset(fault.kind.name for fault in faults)
+        self._planned = frozenset(NODE_OF[fault.kind] for fault in faults)
+        self._gone: set[str] = set()
+        self._has_flown = False
+        self._restarts = 0
+        self._failures: list[str] = []
         self._events: list[Event] = []
         self._begun_at = 0.0
         """Time of the first tick; 0 before."""
         self._last_s, self._moved_at = 0.0, time.monotonic()
 
     def bring_up(self, show: FlightProgress, is_empty: bool) -> None:
-        """Configure all nodes, then activate them, the plant last."""
         show(0.0, "configuring the nodes")
         self._change(self._names, "configure")
         if not is_empty:
-            node, of_others = self._monitor.node, self._topics_of_others
+            of_others = published_topics(self._options.without)
+            node = self._monitor.node
             refuse_publishers(node, self._joined_at, self._names, of_others, self._check_start)
         for name in self._names:
             self._change([name], "activate")
@@ -155,17 +151,21 @@ class _Follower:
             output = self._graph.host_process(name.removesuffix("_node")).output_tail()
             raise FlightError(f"{name} refused to {transition}:\n{output}")
 
+    def _check_start(self) -> None:
+        self._graph.check()
+        if self._stopped:
+            raise InterruptedFlightError("stopped before the flight began", self._stopped[0])
+
     def until_complete(self, show: FlightProgress) -> None:
-        """Monitor the flight, inject faults and show progress."""
         monitor, injector = self._monitor, self._injector
-        while not self._watch.is_complete:
+        while self._graph.leader.exit_code != 0 and not self._has_flown:
             if self._stopped:
                 raise InterruptedFlightError(
                     f"stopped at {monitor.simulated_s:.2f} s", self._stopped[0]
                 )
             time.sleep(INJECTING_POLL_S if injector.is_busy else POLL_S)
             news = [*monitor.poll(), *injector.poll(monitor.simulated_s)]
-            news += self._watch.poll(monitor.simulated_s)
+            news += self._check_processes()
             if arrived := self._own.arrived():
                 show.say(arrived)
             self._show_progress(show)
@@ -174,35 +174,31 @@ class _Follower:
         show(self.total_s, "")
 
     def _keep(self, news: Sequence[Event], show: FlightProgress | None = None) -> None:
-        """Show and keep events before the plant's last clock message; later ends are normal."""
         for event in news:
-            if event.simulated_s < self._last_clock_s:
+            if event.simulated_s < self._last_clock_s:  # later ends are normal
                 self._events.append(event)
                 if show:
                     show.say(str(event))
 
     def end(self) -> dict[str, Any]:
-        """Stop the other nodes; return a report."""
         self._graph.stop()
-        self._watch.check_recorder_exit()
+        recorder = self._graph.host_process("recorder")
+        if recorder.exit_code != 0 and "recorder" not in self._gone:
+            self._failures.append(recorder.output_tail().splitlines()[-1].strip())
         if self._stopped:
             raise InterruptedFlightError("stopped when the flight was complete", self._stopped[0])
         self._keep(self._monitor.poll())  # the nodes' last reports
-        degraded = degradation(self._monitor.values, self._fault_kinds, self._realtime)
+        realtime = self._flight.plant_settings.realtime
+        failures, warnings = degradation(self._monitor.values, self._fault_kinds, realtime)
         return {
             "events": [
                 event._asdict() for event in sorted(self._events, key=lambda e: e.simulated_s)
             ],
             "nodes": self._monitor.values,
-            "restarts": self._watch.restarts,
-            "failures": [*self._watch.failures, *degraded.failures],
-            "warnings": degraded.warnings,
+            "restarts": self._restarts,
+            "failures": [*self._failures, *failures],
+            "warnings": warnings,
         }
-
-    def _check_start(self) -> None:
-        self._graph.check()
-        if self._stopped:
-            raise InterruptedFlightError("stopped before the flight began", self._stopped[0])
 
     def _show_progress(self, show: FlightProgress) -> None:
         monitor, now = self._monitor, time.monotonic()
@@ -224,6 +220,57 @@ class _Follower:
                 f"no progress for {STALL_TIMEOUT_S:.0f} s at {self._last_s:.2f} s:\n{why}{output}"
             )
 
+    def _check_processes(self) -> list[Event]:
+        events = []
+        simulated_s, leader = self._monitor.simulated_s, self._graph.leader
+        for name, node in list(self._graph.nodes.items()):
+            hangs = name == "controller" and self._options.restart_controller and self._hangs(name)
+            if (node.exit_code is None and not hangs) or name in self._gone:
+                continue
+            if node is leader:
+                if node.exit_code != 0:
+                    self._lose_leader(node)
+                continue
+            ended = "does not answer" if hangs else node.exit_summary()
+            events.append(Event(simulated_s, f"{name}_node", ended))
+            if name == "controller":
+                self._lose_controller(node)
+            else:
+                self._gone.add(name)
+                if name == "recorder" or name not in self._planned:
+                    self._failures.append(f"{ended} at {simulated_s:.2f} s")
+        return events
+
+    def _hangs(self, name: str) -> bool:
+        heard_at = self._monitor.heard_at.get(f"{name}_node")
+        return heard_at is not None and time.monotonic() - heard_at > HUNG_S
+
+    def _lose_leader(self, leader: NodeProcess) -> None:
+        self._monitor.poll()
+        is_recorders = leader is self._graph.host_process("recorder")  # which has failed, then
+        last_tick = self._flight.ticks
+        self._has_flown = is_recorders and self._monitor.reported_tick(PLANT) >= last_tick
+        if not self._has_flown:
+            raise leader.early_end()
+
+    def _lose_controller(self, node: NodeProcess) -> None:
+        if self._options.restart_controller and self._restarts < MOST_RESTARTS:
+            self._restarts += 1
+            nodes = self._graph.nodes.items()
+            absent = [f"{name}_node" for name, node in nodes if node.exit_code is not None]
+            # it must discover the recorder before it begins, else the bag lacks its first answers;
+            # the wait is short, since a recorder may be stopped
+            listeners = wait_for("controller", absent)
+            again = {"wait_for": listeners, "listener_timeout": LISTENER_TIMEOUT_S}
+            parameters = {**self._controller_parameters, **again}
+            command = node_command("controller", parameters, self._options.namespace, self._folder)
+            self._graph.restart("controller", command)
+            self._monitor.heard_at.pop("controller_node", None)  # until it speaks again
+        elif "controller" in self._planned:
+            self._gone.add("controller")
+        else:
+            raise node.early_end()
+
 
 def _remark(
     errors: tuple[float, float] | None, simulated_s: float, wall_s: float, unit: str
@@ -236,14 +283,37 @@ def _remark(
     return f"{speed}errors: {of_base}joints {errors[1]:.1e} {unit}"
 
 
-def _restart_command(
-    parameters: Mapping[str, Any], namespace: str, folder: Path, absent: Collection[str]
-) -> Command:
-    """Return the command to restart a controller while some nodes are ``absent``.
+class Injector:
+    """Sender of the signals of a flight's faults at their times."""
 
-    The recorder must discover it before it begins, else its first answers are missing in the
-    bag. The wait is short, since a recorder may be stopped.
-    """
-    listeners = wait_for("controller", absent)
-    again = {"wait_for": listeners, "listener_timeout": LISTENER_TIMEOUT_S}
-    return node_command("controller", {**parameters, **again}, namespace, folder)
+    def __init__(self, faults: Sequence[Fault], graph: Graph) -> None:
+        self._waiting = sorted(faults, key=lambda fault: fault.start_s)
+        self._graph = graph
+        self._stopped: dict[str, float] = {}
+
+    @property
+    def is_busy(self) -> bool:
+        """True if any fault is pending."""
+        return bool(self._waiting or self._stopped)
+
+    def poll(self, simulated_s: float) -> list[Event]:
+        """Inject the faults due at a simulated time."""
+        events = []
+        while self._waiting and self._waiting[0].start_s <= simulated_s:
+            events.append(self._inject(self._waiting.pop(0), simulated_s))
+        for node, until in list(self._stopped.items()):
+            if time.monotonic() >= until:
+                del self._stopped[node]
+                self._graph.nodes[node].signal(signal.SIGCONT)
+                events.append(Event(simulated_s, f"{node}_node", "goes on (SIGCONT)"))
+        return events
+
+    def _inject(self, fault: Fault, simulated_s: float) -> Event:
+        node = NODE_OF[fault.kind]
+        if fault.kind == KILLS[node]:
+            self._graph.nodes[node].signal(signal.SIGKILL)
+            return Event(simulated_s, f"{node}_node", "killed (SIGKILL)")
+        self._graph.nodes[node].signal(signal.SIGSTOP)
+        if math.isfinite(fault.value):
+            self._stopped[node] = time.monotonic() + fault.value
+        return Event(simulated_s, f"{node}_node", "stopped (SIGSTOP)")

@@ -112,7 +112,6 @@ class Monitor:
         return [Event(self._event_time(name), name, mode)] if is_news else []
 
     def _event_time(self, name: str) -> float:
-        """Return the simulated time of a node's last report, from its tick."""
         tick = self.reported_tick(name)
         return tick * self._period if tick > 0 and self._period else self.simulated_s
 

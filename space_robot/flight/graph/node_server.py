@@ -20,8 +20,8 @@ from multiprocessing.connection import Connection
 
 from setproctitle import setproctitle
 
+from ...processes import MODULES
 from ...processes.fork_server import ForkServer, accept_signals, serve_standard_input
-from ...processes.node_modules import MODULES
 
 
 @dataclass(frozen=True)

@@ -5,16 +5,26 @@ from __future__ import annotations
 import math
 import os
 import time
-from collections.abc import Callable, Mapping, Sequence
+import uuid
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from typing import Any
 
-from space_robot_msgs_py.errors import FlightError
+from space_robot_msgs_py.config.validation import full_namespace
+from space_robot_msgs_py.errors import FlightError, InputError
+from space_robot_msgs_py.ros.locks import is_held, living_nodes, node_lock
 from space_robot_msgs_py.ros.process import set_defaults
 from space_robot_msgs_py.topics import ROOT
+from space_robot_sim.plant.settings import MOST_TICKS
+
+from .domain import domain_asked_for
+from .node_names import MISSION, PLANT
 
 TIMEOUT_S = 180.0
 """A node that is configured for the first time with so many joints compiles its kernels first."""
 POLL_S = 0.02
+FIND_S = 5.0
+"""Discovery of a running node takes 0.1 to 1.8 s."""
 ASK_AGAIN_S = 3.0
 """A node in flight looks for calls once a second if its last answer was slow."""
 
@@ -93,18 +103,6 @@ def set_parameters(
         raise FlightError(f"{name} refused to change its parameters: {answer.result.reason}")
 
 
-def get_parameters(node: Any, name: str, parameters: Sequence[str], check: Check) -> list[Any]:
-    """Return the values of a node's parameters, None of one that it does not have (yet)."""
-    from rcl_interfaces.srv import GetParameters
-    from rclpy.parameter import parameter_value_to_python
-
-    request = GetParameters.Request(names=list(parameters))
-    service = f"{name}/get_parameters"
-    (answer,) = _call(node, GetParameters, [service], request, check, may_repeat=True)
-    values = [parameter_value_to_python(value) for value in answer.values]
-    return values or [None] * len(parameters)
-
-
 def call_trigger(node: Any, service: str, check: Check) -> tuple[bool, str]:
     """Call a service of std_srvs/Trigger, however long it takes; return its success and message."""
     from std_srvs.srv import Trigger
@@ -170,7 +168,6 @@ class _Repeated:
         self._ask_at = 0.0
 
     def ask(self) -> None:
-        """Call the service if it is available and a call is due."""
         now = time.monotonic()
         if not self.is_answered and now >= self._ask_at and self._client.service_is_ready():
             self._ask_at = now + ASK_AGAIN_S
@@ -178,19 +175,91 @@ class _Repeated:
 
     @property
     def is_asked(self) -> bool:
-        """True if the service has been called."""
         return bool(self._futures)
 
     @property
     def is_answered(self) -> bool:
-        """True if an answer has arrived."""
         return any(future.done() for future in self._futures)
 
     @property
     def answer(self) -> Any:
-        """The first answer."""
         return next(future.result() for future in self._futures if future.done())
 
     def close(self) -> None:
-        """Stop calling the service."""
         self._node.destroy_client(self._client)
+
+
+def call_simulation(action: str, domain: int | None, namespace: str, ticks: int = 1) -> str:
+    """Call ``pause``, ``resume``, ``step`` (``ticks``) or ``reset`` of a plant; return its message.
+
+    ``domain``: None: ROS_DOMAIN_ID, or that of the only plant on this machine.
+
+    Raises:
+        InputError: no plant is there, or ``ticks`` cannot be.
+        FlightError: the plant refuses.
+    """
+    if not 1 <= ticks <= MOST_TICKS:
+        raise InputError(f"--ticks {ticks}: 1 to {MOST_TICKS} were expected")
+    service = f"{PLANT}/{action}"
+    with _caller("simulation_call", service, domain, namespace) as (node, check):
+        if action == "step":
+            set_parameters(node, PLANT, {"step_ticks": ticks}, check)
+        success, text = call_trigger(node, service, check)
+    if not success:
+        raise FlightError(f"{PLANT} cannot {action}: {text}")
+    return text
+
+
+def go_to(segment: str, domain: int | None, namespace: str) -> None:
+    """Have the mission of a running graph fly a segment, in place of what it was to fly.
+
+    Raises:
+        InputError: no mission is there.
+        FlightError: the segment is refused; the flight goes on as it was.
+    """
+    service = f"{MISSION}/set_parameters_atomically"
+    with _caller("goto", service, domain, namespace) as (node, check):
+        # a text of its own: the mission ignores one that it has had
+        set_parameters(node, MISSION, {"goto": f"{segment} # {uuid.uuid4()}"}, check)
+
+
+@contextmanager
+def _caller(
+    name: str, service: str, domain: int | None, namespace: str
+) -> Iterator[tuple[Any, Check]]:
+    namespace = full_namespace(namespace)
+    domain = domain_asked_for(domain)
+    domain = _plant_domain(namespace) if domain is None else domain
+    visitor = TemporaryNode(name, domain, namespace)
+    try:
+        yield visitor.node, _wait_for(visitor.node, service, domain)
+    finally:
+        visitor.leave()
+
+
+def _plant_domain(namespace: str) -> int:
+    domains = sorted(domain for domain, _ in living_nodes(PLANT, namespace))
+    if len(domains) != 1:
+        name = f"{namespace.rstrip('/')}/{PLANT}"
+        there = f"in ROS domains {', '.join(map(str, domains))}" if domains else "on this machine"
+        number = "several" if domains else "no"
+        raise InputError(f"{number} {name} {there}: name one's ROS domain with --domain")
+    return domains[0]
+
+
+def _wait_for(node: Any, service: str, domain: int) -> Check:
+    until = time.monotonic() + FIND_S
+    while not node.count_services(service):
+        if time.monotonic() > until:
+            name = node.resolve_service_name(service)
+            raise InputError(f"no service {name} in ROS domain {domain}: is a graph flying there?")
+        time.sleep(POLL_S)
+    name = service.rpartition("/")[0]
+    lock = node_lock(domain, node.resolve_service_name(name))
+    is_here = is_held(lock)  # on this machine: discovery lists a killed node for another 20 s
+
+    def check() -> None:
+        if not node.count_services(service) or (is_here and not is_held(lock)):
+            raise FlightError(f"{name} has gone")
+
+    return check

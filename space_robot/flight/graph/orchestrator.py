@@ -25,20 +25,27 @@ from space_robot_msgs_py.errors import FlightError, InputError, SpaceRobotError
 
 from ...processes.interruption import handled_signals
 from ...processes.scratch_folder import ScratchFolder
-from ..bag_path import check_bag_path
 from ..compilation import compile_kernels
-from ..flight_messages import bag_remark
+from ..flight_messages import bag_remark, check_bag_path
 from ..plan import Flight
 from . import composed
 from .composed import NAME
 from .domain import is_quiet, ros_domain
 from .following import follow
 from .monitor import MONITOR
-from .node_names import reset_with, wait_for
+from .node_names import NODE_NAMES, PLANT, reset_with, wait_for
 from .node_server import Program
 from .node_services import own_name
-from .processes import Command, Graph, node_command, node_environment, ros_arguments
+from .processes import (
+    Command,
+    Graph,
+    node_command,
+    node_environment,
+    ros_arguments,
+    write_parameters,
+)
 
+Parameters = Mapping[str, Mapping[str, Any]]
 COMPOSED_DRAIN_S = 0.002
 """Period of the recorder in one process with the other nodes, which wait while it writes."""
 
@@ -102,7 +109,6 @@ def fly(
 def _commands(
     flight: Flight, parameters: Mapping[str, Mapping[str, Any]], folder: Path
 ) -> Mapping[str, Command]:
-    """Return the commands of the processes; files are written to ``folder``."""
     options = flight.scenario.options
     started = {
         node: {**values, "autostart": False}
@@ -117,7 +123,6 @@ def _commands(
 
 
 def _claim(bag: Path) -> None:
-    """Create the folder of the bag for this flight alone."""
     try:
         bag.mkdir(parents=True)
     except OSError:
@@ -126,7 +131,6 @@ def _claim(bag: Path) -> None:
 
 
 def _has_states(bag: Path, namespace: str) -> bool:
-    """Return True if at least one tick was flown."""
     try:
         batches = Selection(open_bag(bag), {}, namespace).batches()
         return any(topic is topics.JOINT_STATES for topic, _ in batches)
@@ -135,11 +139,7 @@ def _has_states(bag: Path, namespace: str) -> bool:
 
 
 def require_ros() -> None:
-    """Check that ROS nodes can be started on this machine.
-
-    Raises:
-        FlightError: rclpy cannot be imported.
-    """
+    """Check that ROS nodes can be started on this machine: that rclpy can be imported."""
     try:
         import rclpy  # noqa: F401
     except ImportError as error:
@@ -194,9 +194,6 @@ def _say(text: str) -> None:
     click.echo(text, err=True)
 
 
-Parameters = Mapping[str, Mapping[str, Any]]
-
-
 def with_files(parameters: Parameters, flight: Flight, folder: Path) -> dict[str, dict[str, Any]]:
     """Write the files that nodes read, and return parameters that name them."""
     named = {node: dict(values) for node, values in parameters.items()}
@@ -218,3 +215,73 @@ def with_files(parameters: Parameters, flight: Flight, folder: Path) -> dict[str
 def _write(path: Path, content: Any) -> str:
     path.write_text(yaml.safe_dump(content, sort_keys=False), encoding="utf-8")
     return str(path)
+
+
+def launched_parameters(
+    flight: Flight,
+    bag: Path,
+    autostart: bool,
+    folder: Path,
+    of_ros: Mapping[str, Mapping[str, Any]],
+) -> Path:
+    """Write a ROS parameter file for launched nodes, and the files it names; return its path.
+
+    All kernels are compiled first; else every node would compile them.
+
+    Args:
+        flight: a checked plan.
+        bag: the folder to record to.
+        autostart: whether the nodes configure and activate themselves; they wait for one another.
+        folder: for the files.
+        of_ros: parameters by node that every ROS node has.
+    """
+    check_bag_path(bag)
+    compile_kernels(bool(flight.plant.names.actuators))
+    parameters = with_files(flight_parameters(flight, bag), flight, folder)
+    started = {
+        node: {**values, "autostart": autostart, **of_ros.get(node, {})}
+        for node, values in parameters.items()
+    }
+    return write_parameters(started, folder / "parameters.yaml")
+
+
+class LaunchedGraph:
+    """Nodes of one launched flight, which end together."""
+
+    def __init__(self, names: Iterable[str] = NODE_NAMES) -> None:
+        self._names = frozenset(names)
+        self._running = set(self._names)
+        self._has_failed = False
+
+    @property
+    def has_ended(self) -> bool:
+        """True if no node runs any more."""
+        return not self._running
+
+    def note_end(self, name: str, exit_code: int, is_stopped: bool) -> str:
+        """Note that a node's process has ended; ``is_stopped``: the whole launch is.
+
+        Returns:
+            Why the flight is not complete, once; empty if it is, or not known yet.
+        """
+        is_first = self._running == self._names
+        self._running.discard(name)
+        failure = ""
+        if exit_code:
+            failure = f"{name} ended with exit code {exit_code}"
+        elif is_first and is_stopped:
+            failure = "stopped before the flight's end"
+        elif is_first and name != PLANT:
+            failure = f"{name} ended before the flight did"
+        if self._has_failed or not failure:
+            return ""
+        self._has_failed = True
+        return failure
+
+
+def report_failure(context: Any, failure: str) -> None:
+    """Log a failure in a launch, which goes on, and ends with exit code 1.
+
+    ``context``: launch's, whose event loop counts errors; an exception would shut all down.
+    """
+    context.asyncio_loop.call_exception_handler({"message": f"error: {failure}"})

@@ -19,7 +19,7 @@ from space_robot_msgs_py.errors import FlightError
 from space_robot_msgs_py.ros.process import clean_environment, defaults, lifeline
 from space_robot_msgs_py.topics import ROOT
 
-from ...processes.node_modules import MODULES
+from ...processes import MODULES
 from .node_server import ForkedProcess, Program, node_server
 
 PACKAGE = "space_robot"

@@ -48,17 +48,16 @@ class ControllerChoice:
         trust: bool = False,
         laws: Sequence[LawInForce] = (),
     ) -> None:
-        """Resolve the parameters.
+        """Resolve the parameters; for ``controller`` to ``trust`` see `ReplayOptions`.
 
         Args:
             flight: the description in the bag; empty for a bag of another recorder.
             folder: for the recorded robot and actuators, as files that parameters name.
-            controller: law to fly (empty: the recorded one).
-            gains: gain set to fly (empty: the recorded one).
+            controller: law to fly.
+            gains: gain set to fly.
             chosen: further parameters of the controller, over the recorded ones.
             trust: whether modules and files that the description names may be opened.
-            laws: in force in flight, by rising tick: of a bag without a description the first one
-                is the law that flew, with its gains.
+            laws: in force in flight; the first one flew if the description does not say.
         """
         if laws and "controller" not in flight:
             gains_used = {name: list(values) for name, values in laws[0].gains.items()}
@@ -142,7 +141,6 @@ class ControllerChoice:
             )
 
     def _check_laws(self, named: str, flown: Mapping[str, Any]) -> None:
-        """Check that no law but those shipped, or given by the user, is imported."""
         if "controller" not in self._overrides:
             require_shipped_law(named)
         if "swaps" not in self._overrides:
@@ -150,13 +148,11 @@ class ControllerChoice:
                 require_shipped_law(_swap_law(swap))
 
     def _check_files(self, flown: Mapping[str, Any]) -> None:
-        """Check that no file is read whose path the bag tells."""
         for what in ("robot", "gains", "navigation_sensors", "actuators"):
             if what not in self._overrides and self.parameters.get(what) == flown.get(what, ""):
                 require_shipped_file(what, str(flown[what]))
 
     def _robot(self, flown: Mapping[str, Any]) -> dict[str, str]:
-        """The recorded robot as a file of its name, which also chooses its gains."""
         content = self._flight.get("controller_robot_file", self._flight.get("robot_file"))
         if content is None:
             return {}
@@ -168,7 +164,6 @@ class ControllerChoice:
         return {"robot": str(path)}
 
     def _actuators(self, flown: Mapping[str, Any]) -> dict[str, str]:
-        """The recorded hardware, as the controller knew it, as a file of its name."""
         flight = self._flight
         content = flight.get("controller_base_actuators", flight.get("base_actuators"))
         if not content:
@@ -179,7 +174,6 @@ class ControllerChoice:
         return {"actuators": str(path)}
 
     def _recorded_gains(self, of_laws: Mapping[str, Tree]) -> dict[str, Any]:
-        """The recorded gains by law, in place of a gain set that is not on this machine."""
         parameters = dict(flatten(of_laws))
         if of_laws and set(map(_swap_law, self._flown_swaps)) <= set(of_laws):
             parameters["gains"] = self.gains_name if self._has_gain_set() else DEFAULT
@@ -193,7 +187,6 @@ class ControllerChoice:
         return False
 
     def _resolve(self) -> ControlLaw:
-        """Resolve settings, robot and actuators; return the law with the gains of its set."""
         own, self._gains = split_gains(self.parameters)
         self.settings = settings = ControllerNodeSettings.resolve(own)
         self.robot = find_robot(settings.robot)
@@ -215,7 +208,6 @@ class ControllerChoice:
 
 
 def _recorded_navigation(flight: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the numbers of the navigation filter that flew, as parameters; no file is read."""
     recorded = flight.get("navigation_filter", {})
     numbers = {f"navigation_filter.{name}": value for name, value in recorded.items()}
     return {"navigation_sensors": "fine", **numbers} if numbers else {}

@@ -78,7 +78,6 @@ class CommandList:
         self._torques.frombytes(self._torque.tobytes())
 
     def _read_foreign(self, data: bytes) -> Form:
-        """Read the torques of a message in another layout; return its form."""
         message = decode(data, topics.COMMAND.type)
         efforts, names = message.effort, list(message.name)
         texts = _text(message.position), _text(message.velocity)
@@ -279,7 +278,6 @@ class Comparison:
 
     @property
     def _replayed_torque(self) -> Array:
-        """The torques of the ticks compared; of all, where nothing was recorded."""
         return self.replayed if len(self._recorded.ticks) else self._replayed.torque
 
     def table(self) -> tuple[Ticks, Array, Array]:

@@ -168,7 +168,6 @@ class Recording:
         yield from begun
 
     def _stamped_messages(self, *wanted: Topic) -> Iterator[tuple[Topic, int, bytes]]:
-        """Yield the messages of some topics whose stamps are whole ticks, with these."""
         for topic, data in self._messages(*wanted):
             with suppress(MessageError):
                 yield topic, message_tick(topic, data, self.timebase), data

@@ -8,7 +8,7 @@ from array import array
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from itertools import islice
 from pathlib import Path
 from typing import Any
@@ -22,6 +22,7 @@ from space_robot_control.controller.tick import NEW
 from space_robot_control.laws.base import LawError
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.bag.law_history import as_data, within
+from space_robot_msgs_py.config.arguments import as_path
 from space_robot_msgs_py.config.validation import one_of
 from space_robot_msgs_py.errors import FlightError, InputError, MessageError, SpaceRobotError
 from space_robot_msgs_py.samples import LawInForce, RobotState
@@ -143,7 +144,6 @@ class Replay:
         return round(tick * self.recording.timebase.period, 9) if math.isfinite(tick) else None
 
     def _reasons(self) -> Iterator[str]:
-        """Yield reasons why an unchanged controller may give different bits."""
         flight, has_laws = self.recording.flight, bool(self.laws)
         if self.options.start_s > 0.0:
             yield (
@@ -181,26 +181,20 @@ class RecordedLaws:
         put: Callable[[LawInForce], None],
         start_again: Callable[[], None],
     ) -> None:
-        """Begin before the first state.
-
-        ``laws``: by rising tick; ``put``: puts one in force; ``start_again``: gives the controller
-        a fresh memory, as a restart did in flight.
-        """
+        """``laws``: by rising tick; ``start_again``: as a controller restarted in flight."""
         self._coming = deque(laws)
         self._put, self._start_again = put, start_again
         self._has_begun = False
 
     def before(self, tick: int) -> None:
         """Put in force the law of ``tick`` before its state is sent; call it for each tick."""
-        if not self._coming or self._coming[0].tick > tick:
-            self._has_begun = True
-            return
-        due = [self._coming.popleft()]
+        due = []
         while self._coming and self._coming[0].tick <= tick:
             due.append(self._coming.popleft())
         if self._has_begun and any(law.is_first for law in due):
             self._start_again()
-        self._put(due[-1])
+        if due:
+            self._put(due[-1])
         self._has_begun = True
 
 
@@ -286,26 +280,37 @@ class ReplayedController:
                 self.answers.add(data)
 
 
-def replay(options: ReplayOptions) -> Replay:
-    """Answer the states of a bag anew, and compare the commands with the recorded ones.
+def replay(bag: str | Path, **options: Any) -> Replay:
+    """Answer the states of a bag by a new controller, and compare its commands bit for bit.
+
+    ``has_passed`` of the result is the verdict, ``report()`` is the output of ``replay --json``.
+
+    Args:
+        bag: folder of the recorded flight.
+        options: those of `ReplayOptions`: ``controller``, ``gains``, ``parameters`` of the
+            controller, ``start_s``, ``end_s``, ...
 
     Raises:
         InputError: bag or options cannot be used.
         FlightError: the controller failed at the first state.
     """
-    recording = Recording(options.bag, options.remap, options.namespace)
+    allowed = [field.name for field in fields(ReplayOptions) if field.name != "bag"]
+    for name in options:
+        one_of(name, allowed, "option", " of replay")
+    asked = ReplayOptions(as_path(bag, "bag"), **options)
+    recording = Recording(asked.bag, asked.remap, asked.namespace)
     laws = recording.laws()
     with ScratchFolder() as folder:
         choice = ControllerChoice(
             recording.flight,
             Path(folder),
-            options.controller,
-            options.gains,
-            options.parameters,
-            options.trust,
+            asked.controller,
+            asked.gains,
+            asked.parameters,
+            asked.trust,
             laws,
         )
-        return _replay(options, recording, choice, laws)
+        return _replay(asked, recording, choice, laws)
 
 
 def _replay(

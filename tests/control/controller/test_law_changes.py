@@ -13,7 +13,7 @@ import pytest
 from flights import forked_space_robot, space_robot_here, wait_for_nodes
 
 from space_robot.flight.graph.domain import ros_domain
-from space_robot.flight.replay.run import ReplayOptions, replay
+from space_robot.flight.replay.run import replay
 from space_robot_msgs_py.bag.reader import read_flight
 
 pytest.importorskip("rclpy")
@@ -166,7 +166,7 @@ def test_it_replays_to_the_last_bit(flown: Flown) -> None:
     assert flown.log.commanded_torque is not None
     answered = np.flatnonzero(np.isfinite(flown.log.commanded_torque).all(axis=1))
     assert flown.log.laws[6].tick in answered, "the recorder has missed the first answer"
-    done = replay(ReplayOptions(flown.bag))
+    done = replay(flown.bag)
     assert done.is_judged
     assert done.comparison.is_identical, done.report()["first_difference"]
     np.testing.assert_array_equal(done.comparison.ticks, answered)

@@ -11,9 +11,9 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from space_robot.analysis.errors import tracking_error
-from space_robot.flight.closed_loop import close_loop
 from space_robot.flight.flown_log import empty_log
 from space_robot.flight.plan import Flight, Scenario, resolve
+from space_robot.flight.simulate import close_loop
 from space_robot_control.controller.controller import TRANSFER_S, Controller
 from space_robot_control.controller.gains import build_law
 from space_robot_control.controller.law_choice import Swap, parse_swaps

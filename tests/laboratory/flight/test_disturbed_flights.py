@@ -18,8 +18,8 @@ from flights import planned, simulated
 from numpy.typing import NDArray
 
 import space_robot as sr
-from space_robot.flight.closed_loop import close_loop
 from space_robot.flight.flown_log import empty_log
+from space_robot.flight.simulate import close_loop
 from space_robot.scenario.comparison import recorded_scenario
 from space_robot_control.laws import laws
 from space_robot_msgs_py.errors import InputError

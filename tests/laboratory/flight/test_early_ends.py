@@ -20,8 +20,8 @@ from matrix.scenarios import difference
 
 from space_robot.analysis import analyze
 from space_robot.flight import compilation
-from space_robot.flight.bag_path import check_bag_path, default_bag
 from space_robot.flight.ending import COMPLETE, DIVERGED, FAILED, UNANSWERED, Ending
+from space_robot.flight.flight_messages import check_bag_path, default_bag
 from space_robot.flight.plan import Flight
 from space_robot.flight.simulate import simulate
 from space_robot_control.laws import Signals

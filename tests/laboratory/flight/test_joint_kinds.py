@@ -22,7 +22,7 @@ from space_robot.analysis.measure import describe
 from space_robot.analysis.momentum import momentum_of
 from space_robot.analysis.report_tables import rms_table
 from space_robot.analysis.words import of_statistic
-from space_robot.flight.batch.batch import batches
+from space_robot.flight.batch import batches
 from space_robot.flight.simulate import simulate
 from space_robot_model.robot import Robot
 from space_robot_model.robot.gears import motor_momentum

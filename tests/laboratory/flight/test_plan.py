@@ -25,8 +25,7 @@ from space_robot.flight.flown_log import empty_log
 from space_robot.flight.graph.orchestrator import flight_parameters
 from space_robot.flight.plan import Flight, Scenario, resolve
 from space_robot.flight.simulate import simulate
-from space_robot.processes import software
-from space_robot.processes.node_modules import MODULES
+from space_robot.processes import MODULES, software
 from space_robot.scenario.faults import KINDS
 from space_robot.scenario.node_settings import NODES, SCHEMAS
 from space_robot_control.allocation.settings import assumed_actuators

@@ -17,10 +17,15 @@ from typing import Any
 
 import psutil
 import pytest
+from forked import forked_server
 
-from space_robot.processes.child_process import child_process
 from space_robot.processes.fork_server import ForkServer, accept_signals
-from space_robot.processes.interruption import Interrupted, not_lost_in_callbacks, raising_signals
+from space_robot.processes.interruption import (
+    Interrupted,
+    child_process,
+    not_lost_in_callbacks,
+    raising_signals,
+)
 from space_robot.processes.scratch_folder import NEW_S, PREFIX, ScratchFolder
 
 HELPER = [
@@ -36,7 +41,7 @@ HELPER = [
 
 STARTER = f"""
 import subprocess, time
-from space_robot.processes.child_process import child_process
+from space_robot.processes.interruption import child_process
 with child_process({HELPER!r}, stdout=subprocess.PIPE) as helper:
     helper.stdout.readline()
     print(helper.pid, flush=True)
@@ -78,7 +83,7 @@ def echo(connection: Connection, descriptors: Sequence[int], server: int) -> Non
 
 @pytest.fixture
 def server() -> Iterator[ForkServer]:
-    server = ForkServer.of_this_process(echo)
+    server = forked_server(echo)
     yield server
     server.close()
 
@@ -98,7 +103,6 @@ def test_children_talk_to_the_process_that_asked_for_them_and_end_with_the_serve
     assert not any(psutil.pid_exists(pid) for pid in (one, two, parent))
     with pytest.raises(OSError, match="Bad file descriptor"):
         server.exit_code(one)
-    assert server.end(one) is None
 
 
 def test_a_child_gets_open_files_too(server: ForkServer) -> None:
@@ -129,18 +133,17 @@ def test_the_exit_code_is_the_childs_and_stays(server: ForkServer) -> None:
         while server.exit_code(child) is None:
             assert time.monotonic() < until
             time.sleep(0.005)
-        assert [server.exit_code(child), server.exit_code(child), server.end(child)] == [code] * 3
+        assert [server.exit_code(child), server.exit_code(child)] == [code] * 2
         assert not psutil.pid_exists(child)
 
 
 def test_a_killed_server_is_an_error_not_a_hang(server: ForkServer) -> None:
-    pid, connection = server.fork()
+    _, connection = server.fork()
     connection.send("who")
     *_, of_server = connection.recv()
     os.kill(of_server, signal.SIGKILL)
     with pytest.raises(ConnectionError):
         server.fork()
-    assert server.end(pid) is None
     connection.send(0)  # its child lives on, until it is asked to end
 
 

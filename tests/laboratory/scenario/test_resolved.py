@@ -15,7 +15,7 @@ from paths import CONFIG
 from robots import driven_paper
 
 from space_robot.analysis import analyze
-from space_robot.flight.bag_path import default_bag
+from space_robot.flight.flight_messages import default_bag
 from space_robot.flight.plan import Flight
 from space_robot.flight.simulate import simulate
 from space_robot.scenario.node_settings import NODES, NOT_TO_BE_SET, SCHEMAS, FlightSettings

@@ -24,9 +24,9 @@ from robots import driven_paper
 from rosbags.rosbag2 import Reader
 
 from space_robot.analysis import analyze
-from space_robot.flight.graph import simulation_calls
-from space_robot.flight.graph.launched import launched_parameters
+from space_robot.flight.graph import node_services
 from space_robot.flight.graph.node_services import set_parameters
+from space_robot.flight.graph.orchestrator import launched_parameters
 from space_robot_model.robot.find import find_robot
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.bag.reader import read_flight
@@ -206,9 +206,9 @@ def test_a_mission_that_is_killed_is_not_waited_for_and_a_dead_controller_ends_t
         os.kill(flight.processes["mission"].pid, signal.SIGKILL)
         set_parameters(*arguments)
 
-    monkeypatch.setattr(simulation_calls, "set_parameters", killed_before)
+    monkeypatch.setattr(node_services, "set_parameters", killed_before)
     with pytest.raises(FlightError, match="mission_node has gone"):
-        simulation_calls.go_to("{hold: 1}", free_domain, "")
+        node_services.go_to("{hold: 1}", free_domain, "")
     flight.processes["controller"].kill()
     code, _, errors = flight.end()
     assert code == 1

@@ -13,7 +13,7 @@ from flights import Start, forked_space_robot, ros_environment, simulated
 from forked import Forked
 
 from space_robot.flight.graph.node_names import wait_for
-from space_robot.processes.node_modules import MODULES
+from space_robot.processes import MODULES
 from space_robot_model.robot import Robot
 from space_robot_model.robot.markers import RobotMarkers
 from space_robot_model.robot.placements import RobotPoses

@@ -17,9 +17,9 @@ import psutil
 import pytest
 
 from space_robot.flight.graph.following import degradation
-from space_robot.flight.graph.launched import LaunchedGraph
 from space_robot.flight.graph.node_names import NODE_NAMES
 from space_robot.flight.graph.node_server import ForkedProcess, Program, node_server
+from space_robot.flight.graph.orchestrator import LaunchedGraph
 from space_robot.flight.graph.processes import TAIL_LINES, NodeProcess
 from space_robot_msgs_py.ros.process import set_defaults
 

@@ -24,11 +24,11 @@ from matrix.scenarios import difference
 from paths import ROOT
 
 from space_robot.analysis import analyze
-from space_robot.flight.bag_path import check_bag_path
+from space_robot.flight.flight_messages import check_bag_path
 from space_robot.flight.graph import domain as domains
 from space_robot.flight.graph import orchestrator
 from space_robot.flight.graph.domain import is_quiet, ros_domain
-from space_robot.processes.node_modules import MODULES
+from space_robot.processes import MODULES
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.bag.folder import open_bag
 from space_robot_msgs_py.bag.reader import read_flight

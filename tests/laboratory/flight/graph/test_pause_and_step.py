@@ -31,7 +31,7 @@ pytest.importorskip("rclpy")
 from ground import Ground  # noqa: E402
 from rclpy.duration import Duration  # noqa: E402
 
-from space_robot.flight.graph.simulation_calls import go_to  # noqa: E402
+from space_robot.flight.graph.node_services import go_to  # noqa: E402
 from space_robot_msgs_py.ros.endpoints import (  # noqa: E402
     PolledCallbackGroup,
     RawSubscription,
@@ -91,7 +91,7 @@ def test_pauses_steps_and_a_reset_leave_no_trace(
     before = read_flight(tmp_path / "bag_before_reset_1")
     assert before.ticks == 151, "ticks 0 to 150 have been measured and answered"
     assert not any(before.lost.values())
-    monkeypatch.setattr("space_robot.flight.graph.simulation_calls.FIND_S", 0.0)
+    monkeypatch.setattr("space_robot.flight.graph.node_services.FIND_S", 0.0)
     assert "no service /plant_node/pause in ROS domain" in flight.sim("pause", code=2)
 
 

@@ -21,7 +21,7 @@ from hypothesis import strategies as st
 
 from space_robot.flight.replay.choice import ControllerChoice
 from space_robot.flight.replay.recording import COMPARED, Recording
-from space_robot.flight.replay.run import ReferenceStream, ReplayOptions, replay
+from space_robot.flight.replay.run import ReferenceStream, replay
 from space_robot_control.controller.gains import build_laws, split_gains
 from space_robot_control.controller.settings import ControllerNodeSettings
 from space_robot_msgs_py import topics
@@ -235,7 +235,7 @@ def test_another_law_answers_a_bag_of_ros2_bag_record_and_is_not_judged(
 def test_without_any_commands_a_flight_is_only_shown(bag: Path, tmp_path: Path) -> None:
     flight = json.loads(open_bag(bag).custom_data()["space_robot.flight"])
     copied(bag, tmp_path / "none", lambda name, number: name != "/command", **flight)
-    done = replay(ReplayOptions(tmp_path / "none"))
+    done = replay(tmp_path / "none")
     assert done.has_passed
     assert not done.is_judged
     assert done.report()["played"] == TICKS
@@ -243,7 +243,7 @@ def test_without_any_commands_a_flight_is_only_shown(bag: Path, tmp_path: Path) 
 
 def test_a_part_is_compared_by_itself(bag: Path) -> None:
     """A law without memory is equal again once it has taken over from the applied torque."""
-    part = replay(ReplayOptions(bag, start_s=0.05, end_s=0.15))
+    part = replay(bag, start_s=0.05, end_s=0.15)
     assert part.comparison.ticks.tolist() == list(range(100, 300))
     assert part.comparison.equal[41:].all()  # the transfer lasts 20 ms
     assert not part.comparison.equal[1]
@@ -265,4 +265,4 @@ def test_a_bag_without_its_robot_is_refused_in_one_line(tmp_path: Path) -> None:
     simulated(tmp_path / "flown", robot="seven_joint", duration=0.01)
     bag = rosbags_bag(tmp_path / "bag", entries_of(tmp_path / "flown"), lambda writer: None)
     with pytest.raises(InputError, match="which robot was flown, with 7 joints: name it with"):
-        replay(ReplayOptions(bag))
+        replay(bag)

@@ -1,4 +1,4 @@
-"""The compiled loop of plants and controllers in lanes, eight flights at a time."""
+"""The compiled loops of eight flights in lanes: under a law, and under torques from outside."""
 
 from __future__ import annotations
 
@@ -106,22 +106,9 @@ def fly_lanes(
 ) -> int:
     """Fly from the tick ``start`` to ``stop``, or until no flight goes on.
 
-    The sensors have measured ``start``, and not yet the tick reached. The memory of a flight that
-    ends is left in its record by itself, as it was then.
-
-    Args:
-        law: gains and memory in lanes; ``h_bar`` (m, 8).
-        allocate: an `allocation_code`.
-        memory: of the flights.
-        log: to be filled.
-        references: of the ticks in the log.
-        row: of ``start`` in the log.
-        start: first tick.
-        stop: tick after the last.
-        period: s.
-
-    Returns:
-        The tick reached.
+    The sensors have measured ``start``, and not yet the tick reached, which is returned. The memory
+    of a flight that ends is left in its record by itself, as it was then. ``law`` is in lanes, with
+    ``h_bar`` (m, 8); ``log`` is filled from ``row`` on, where ``references`` has ``start``.
     """
     plant, controllers = memory.plants.block[0], memory.controllers.block
     buffer, torque = as_lanes(memory.command_delay_buffer), as_lanes(memory.torque)
@@ -176,7 +163,6 @@ def measure_lanes(plants: Block, tick: int, period: float) -> None:
 
 @kernel
 def _end(memory: LaneMemory, ends: bool) -> None:
-    """End the flights of some lanes, and keep their memory."""
     if not any_lane(ends):
         return
     for lane in range(WIDTH):
@@ -196,7 +182,6 @@ def take_out(records: InLanes, lane: int) -> None:
 
 @kernel
 def _refer(references: References, row: int, numbers: Array) -> None:
-    """Write the references of a tick into ``numbers`` (..., 8)."""
     for lane in range(WIDTH):
         desired = references.numbers[references.missions[lane], row]
         for i in range(desired.size):
@@ -205,7 +190,6 @@ def _refer(references: References, row: int, numbers: Array) -> None:
 
 @kernel
 def _log_state(columns: Any, row: int, places: NDArray[np.int64], numbers: Array) -> None:
-    """Write the signals of a state, at their places in ``numbers`` (N, 8), into their columns."""
     for k in range(len(places)):
         column = columns[k]
         for lane in range(WIDTH):
@@ -228,7 +212,6 @@ def _allocate(
     axes: int,
     tick: int,
 ) -> None:
-    """Allocate the torque on the base, flight by flight: its branches differ too much."""
     in_lanes = memory.controllers.block[0].allocation
     for lane in range(WIDTH):
         if lane_of(is_flying, lane):
@@ -244,3 +227,54 @@ def _allocate(
             allocate(allocation, float(tick))
             for i in range(axes, torque.size):
                 torque[i] = with_lane(torque[i], lane, allocation.command[i - axes])
+
+
+@kernel
+def fly_benches(
+    plants: Block,
+    alone: Block,
+    command_delay_buffers: Array,
+    torques: Array,
+    tick: int,
+    period: float,
+    flies: Array,
+    fastest: Array,
+    goes_on: bool,
+) -> None:
+    """Fly 8 G plants, (G,) in lanes, from ``tick`` to the next, under ``torques`` (8 G, m+A).
+
+    Args:
+        plants: (G,) block of `PlantMemory` in lanes.
+        alone: (8 G,) block of `PlantMemory`, in which a flight is integrated by itself.
+        command_delay_buffers: (G, ticks, m+A, 8).
+        torques: of each flight, N m.
+        tick: at which they are given.
+        period: s.
+        flies: (8 G,) 1 for a flight that goes on; set to 0 if it has diverged.
+        fastest: (8 G,) set to the `fastest_rate` of each plant, rad/s.
+        goes_on: the sensors are to measure the next tick at once.
+    """
+    numbers = np.zeros((torques.shape[1], WIDTH))
+    flying = np.zeros((1, WIDTH))
+    for group in range(plants.size):
+        first = WIDTH * group
+        for lane in range(WIDTH):
+            flying[0, lane] = flies[first + lane]
+            for i in range(len(numbers)):
+                numbers[i, lane] = torques[first + lane, i]
+        rate = advance_lanes(
+            plants[group],
+            alone[first : first + WIDTH],
+            as_lanes(command_delay_buffers[group]),
+            as_lanes(numbers),
+            tick,
+            period,
+            as_lanes(flying)[0] == 1.0,
+        )
+        for lane in range(WIDTH):
+            fastest[first + lane] = lane_of(rate, lane)
+    if goes_on:
+        measure_lanes(plants, tick + 1, period)
+    for k in range(len(flies)):
+        if flies[k] == 1.0 and not fastest[k] <= RATE_LIMIT:
+            flies[k] = 0.0

@@ -18,9 +18,9 @@ from space_robot_msgs_py.samples import ALL_FIELDS, Reference, ReferenceChunk, S
 from space_robot_sim.plant.plant import Plant
 from space_robot_sim.plant.tick import PlantMemory
 
-from ..flown_log import allocate_columns, empty_log, new_array
-from ..plan import Flight
+from .flown_log import allocate_columns, empty_log, new_array
 from .lane_loop import InLanes, LaneLog, LaneMemory, References, take_out
+from .plan import Flight
 
 Array = NDArray[np.float64]
 
@@ -198,7 +198,6 @@ def _columns(flight: Flight, ticks: int, is_brief: bool) -> list[Array]:
 
 
 def _places(state: str, n: int) -> NDArray[np.int64]:
-    """Return where the signals of a state begin in a `PlantMemory`."""
     fields, signals = PlantMemory.dtype(n).fields, State.dtype(n).fields
     assert fields is not None
     assert signals is not None
@@ -210,6 +209,5 @@ def _next(columns: Iterator[Array], shape: tuple[int, ...]) -> Array:
 
 
 def _numbers(chunk: ReferenceChunk) -> Array:
-    """Return the numbers (N, ...) of the `Reference` of each tick."""
     numbers: Array = chunk.references().view(np.float64)
     return numbers.reshape(len(chunk.joints), -1)

@@ -24,13 +24,12 @@ from space_robot_sim.plant.plant import Plant
 from space_robot_sim.plant.settings import PlantSettings
 from space_robot_sim.plant.tick import PlantMemory
 
-from ..bench import LARGEST_SEED, check_for_bench, seeded
-from ..ending import Ending
-from ..plan import Flight
 from .batch import plant_key
-from .bench_loop import fly_benches
-from .lane_loop import InLanes, measure_lanes
+from .bench import LARGEST_SEED, check_for_bench, seeded
+from .ending import Ending
+from .lane_loop import InLanes, fly_benches, measure_lanes
 from .lane_memory import begin_tick, delay_buffers, fill
+from .plan import Flight
 
 Array = NDArray[np.float64]
 
@@ -39,12 +38,7 @@ class Benches:
     """Plants of many flights of robots with n joints, stepped together."""
 
     def __init__(self, flights: Sequence[Flight]) -> None:
-        """Put flights on benches.
-
-        Raises:
-            InputError: there are none; they differ in joints or actuators; a flight needs a graph
-                of nodes or has faults of messages.
-        """
+        """Put flights on benches: of robots with the same number of joints and actuators."""
         if not flights:
             raise InputError("at least one flight is needed")
         for number, flight in enumerate(flights):
@@ -84,9 +78,6 @@ class Benches:
         Args:
             seed: of the random numbers of sensors and faults: of the first flight, the next ones
                 have the numbers after it; or one for each. None: the flights' own.
-
-        Raises:
-            InputError: a seed is not a whole number from 0 to 2147483647, or their number is wrong.
         """
         plants = [
             Plant(flight.robot, settings, flight.period)
@@ -133,7 +124,6 @@ class Benches:
         return [seeded(flight, first + k) for k, flight in enumerate(self.flights)]
 
     def _commands(self, torques: Array) -> Array:
-        """Return the number (K, m+A) for each axis and actuator."""
         count, axes, commanded = len(self.flights), len(self.names.axes), len(self.names.commanded)
         if torques.shape == (count, commanded):
             return torques
@@ -151,10 +141,7 @@ class Benches:
 
 
 class _BenchSet:
-    """Flights of benches that can share batches."""
-
     def __init__(self, benches: Benches, numbers: NDArray[np.int64], plants: list[Plant]) -> None:
-        """Put the flights with some ``numbers`` into lanes."""
         self._benches, self._numbers = benches, numbers
         self._plants = [plants[k] for k in numbers]
         first = benches.flights[numbers[0]]
@@ -188,7 +175,6 @@ class _BenchSet:
         self._show(everyone, everyone)
 
     def step(self, commands: Array) -> None:
-        """Fly to the next tick; the flights that are over stand still."""
         if not self._flies.any():
             return
         count, tick = len(self._numbers), self._tick + 1
@@ -226,7 +212,6 @@ class _BenchSet:
         self._show(measured, flew)
 
     def _show(self, measured: NDArray[np.int64], flew: NDArray[np.int64]) -> None:
-        """Copy the states of flights, by lane, out of the lanes."""
         for (rows, lanes), flights in zip(self._shown, (measured, flew), strict=True):
             groups, within = np.divmod(flights, WIDTH)
             rows[self._numbers[flights]] = lanes[groups, :, within]

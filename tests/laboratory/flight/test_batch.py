@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 import space_robot as sr
 from space_robot import Scenario
 from space_robot.analysis.errors import controls_base
-from space_robot.flight.batch.batch import FlightBatch, batch_key, batch_obstacle, batches
-from space_robot.flight.batch.benches import Benches
+from space_robot.flight.batch import FlightBatch, batch_key, batch_obstacle, batches
+from space_robot.flight.benches import Benches
 from space_robot.flight.plan import Flight
 from space_robot.flight.simulate import simulate
 from space_robot_control.laws import laws

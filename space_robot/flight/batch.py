@@ -17,12 +17,12 @@ from space_robot_msgs_py.errors import FlightError, InputError
 from space_robot_sim.plant.plant import Plant
 from space_robot_sim.plant.tick import PlantMemory
 
-from ..closed_loop import measured_ticks
-from ..ending import Ending
-from ..flown_log import ended_early, note_assumed_errors
-from ..plan import Flight
+from .ending import Ending
+from .flown_log import ended_early, note_assumed_errors
 from .lane_loop import fly_lanes, measure_lanes
 from .lane_memory import LawInLanes, LogsInLanes, begin_tick, copy_back, copy_command, lane_memory
+from .plan import Flight
+from .simulate import measured_ticks
 
 
 def batch_obstacle(flight: Flight) -> str:
@@ -40,7 +40,6 @@ def batch_obstacle(flight: Flight) -> str:
 
 @cache
 def _law_obstacle(law: Any) -> str:
-    """Return why a class of laws flies alone; one that cannot be compiled is tried once."""
     if not issubclass(law, CompiledLaw):
         return f"law {law.name!r} is plain Python"
     try:
@@ -149,7 +148,6 @@ class FlightBatch:
         return FlownInBatch(k, log, Ending.early(error, flight.period))
 
     def _error(self, k: int, reached: int) -> FlightError:
-        """Return the error that ended a flight, and leave its plant as it was then."""
         plant, memory = self.flights[k].plant, self._memory
         plant.state.tick = plant.truth.tick = reached
         copy_command(memory, self.flights, k)
@@ -170,7 +168,6 @@ class FlightBatch:
                 tick = end
 
     def _fly_to(self, logs: LogsInLanes, start: int, stop: int) -> None:
-        """Fly from tick to tick, and begin the last one."""
         first, memory = self.flights[0], self._memory
         end = fly_lanes(
             self._law.code,
@@ -188,7 +185,6 @@ class FlightBatch:
         measure_lanes(memory.plants.block, end, first.period)
 
     def _choose_laws(self, logs: LogsInLanes, tick: int) -> None:
-        """Let the laws of a planned swap take over, and log changes."""
         is_swapped = False
         for k, (flight, choice) in enumerate(zip(self.flights, self._choices, strict=True)):
             change = choice.change_at(tick)

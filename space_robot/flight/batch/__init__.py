@@ -1,1 +1,0 @@
-"""Eight flights flown together, each with the bits that it has alone."""
