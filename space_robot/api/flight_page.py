@@ -29,20 +29,11 @@ class FlightPage:
     """
 
     def __init__(self, html: str, height: int = HEIGHT_PX) -> None:
-        """Store the page.
-
-        Args:
-            html: the page.
-            height: of its frame in a notebook, px.
-        """
+        """``height``: of its frame in a notebook, px."""
         self.html, self.height = html, height
 
     def save(self, path: str | Path) -> Path:
-        """Write the page to a file, which is replaced if it exists, and return its path.
-
-        Raises:
-            InputError: it cannot be written.
-        """
+        """Write the page to a file, which is replaced if it exists, and return its path."""
         file = as_path(path, "path")
         make_folder(file.parent)
         check_writable(file)
@@ -61,11 +52,7 @@ class FlightPage:
 
 
 def draw_page(logs: Sequence[FlightLog], robots: Sequence[Robot], options: ViewOptions) -> str:
-    """Return the page of flights, named by their laws.
-
-    Raises:
-        InputError: viser is not installed, or a flight has no state.
-    """
+    """Return the page of flights, named by their laws."""
     from ..view.flights import flights_page  # slow to import
     from ..view.stage import check_viser
 
@@ -92,11 +79,7 @@ def unique_names(names: Sequence[str]) -> list[str]:
 
 
 def show_page(page: FlightPage, file: str | Path, opens: bool) -> None:
-    """Write a page and open it in a browser; print where it is.
-
-    Raises:
-        InputError: it cannot be written.
-    """
+    """Write a page and open it in a browser; print where it is."""
     path = page.save(file)
     print(f"wrote {path} ({path.stat().st_size / 1e6:.1f} MB)", file=sys.stderr)
     if opens and not webbrowser.open(path.absolute().as_uri()):

@@ -74,9 +74,6 @@ class SpaceRobotEnv(gymnasium.Env[Array, Array]):
                 is called at every reset; the number of joints must be constant.
             ticks_per_step: 20 ticks of 0.5 ms give 100 steps/s.
             torque_scale: torque, N m (prismatic joints: N), of an action of 1; scalar or (m,).
-
-        Raises:
-            InputError: the scenario cannot be flown, or a number is out of its range.
         """
         if scenario is None:
             scenario = Scenario(controller=None)
@@ -110,11 +107,7 @@ class SpaceRobotEnv(gymnasium.Env[Array, Array]):
         return self._observation(state), self._info()
 
     def step(self, action: Array) -> tuple[Array, float, bool, bool, dict[str, Any]]:
-        """Apply an action for ``ticks_per_step`` ticks, fewer at the end of the mission.
-
-        Raises:
-            InputError: the action does not have m numbers, or the episode is over.
-        """
+        """Apply an action for ``ticks_per_step`` ticks, fewer at the end of the mission."""
         bench, action = self.bench, as_numbers(action, "action")
         if action.shape != self.action_space.shape:
             raise InputError(

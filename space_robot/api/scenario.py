@@ -132,12 +132,8 @@ class FlyableScenario(Scenario):
     def bench(self, record: bool = True) -> Bench:
         """Return a bench at the flight's first tick.
 
-        Args:
-            record: keep the commands, for `Bench.log` and `Bench.flown`: half a microsecond and
-                some 110 bytes a tick; 300 bytes more where the law is asked.
-
-        Raises:
-            InputError: see `check`.
+        ``record``: keep the commands, for `Bench.log` and `Bench.flown`: half a microsecond and
+        some 110 bytes a tick; 300 bytes more where the law is asked.
         """
         flight = self.check()
         compile_kernels(bool(flight.plant.names.actuators))

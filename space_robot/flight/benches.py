@@ -75,9 +75,8 @@ class Benches:
     def reset(self, seed: int | Sequence[int] | None = None) -> Block:
         """Begin all flights anew and return the measured states of tick 0.
 
-        Args:
-            seed: of the random numbers of sensors and faults: of the first flight, the next ones
-                have the numbers after it; or one for each. None: the flights' own.
+        ``seed``: of the random numbers of the first flight, the next ones have the numbers after
+        it; or one for each; 0 to 2147483647. None: the flights' own.
         """
         plants = [
             Plant(flight.robot, settings, flight.period)
@@ -164,11 +163,11 @@ class _BenchSet:
         self._flies[: len(numbers)] = 1.0
         self._next_change = np.array([plant.next_change for plant in self._plants])
         size = State.dtype(n).itemsize // 8
-        of_plant: Any = self._blocks.dtype.fields
+        fields: Any = self._blocks.dtype.fields
         self._shown = [
             (states.view(np.float64).reshape(-1, size), lanes[:, place : place + size])
             for states, name in ((benches.states, "measured"), (benches.truths, "truth"))
-            for place in (of_plant[name][1] // (8 * WIDTH),)
+            for place in (fields[name][1] // (8 * WIDTH),)
         ]
         """Rows of numbers of the measured and of the true states, and the same in lanes."""
         everyone = np.arange(len(numbers))

@@ -70,14 +70,9 @@ def actuator_load(
 ) -> ActuatorLoad:
     """Return what is asked of actuators that turn a base; all on its axes.
 
-    Wheels alone share a torque as the allocation does, see `wheel_loads`; thrusters, and thrusters
-    with wheels, in the best way.
-
-    Args:
-        hardware: wheels, thrusters, or both.
-        torque: (K, 3) N m.
-        momentum: (K, 3) N m s, that the base has been given, less `carried_momentum`.
-        omega: (K, 3) rad/s.
+    ``torque`` (K, 3) N m; ``momentum`` (K, 3) N m s, that the base has been given, less
+    `carried_momentum`; ``omega`` (K, 3) rad/s. Wheels alone share a torque as the allocation does,
+    see `wheel_loads`; thrusters, and thrusters with wheels, in the best way.
     """
     wheels, nothing = hardware.wheels, np.zeros(len(torque))
     if hardware.thruster_count:
@@ -100,12 +95,9 @@ def wheel_loads(
     The motors give what changes the wheels' momentum, the turning of the base under it included,
     and what friction takes: ``u = -P (tau + w x h) + f``, with P of `wheel_shares`.
 
-    Args:
-        wheels: on the base.
-        torque: (K, 3) tau, N m, on the base.
-        momentum: (K, 3) N m s, that the wheels together have got since their initial speeds, see
-            `carried_momentum`.
-        omega: (K, 3) w, rad/s, of the base. All on its axes.
+    On the base's axes: its ``torque`` tau (K, 3), N m; the ``momentum`` (K, 3), N m s, that the
+    wheels together have got since their initial speeds, see `carried_momentum`; its ``omega`` w
+    (K, 3), rad/s.
     """
     shares = wheel_shares(wheels)
     held = product(momentum, shares.T) + wheels.spin_momenta(wheels.values("initial_speed"))
@@ -116,15 +108,10 @@ def wheel_loads(
 
 
 def carried_momentum(wheels: WheelSettings, start: Array, axes: Array) -> Array:
-    """Return what wheels must get to keep their first momentum on inertial axes, on the base's.
+    """(K, 3) N m s, base axes, that wheels must get to keep their first momentum on inertial axes.
 
-    Args:
-        wheels: on the base, with their initial speeds.
-        start: (3, 3, 1) the base's axes at the start.
-        axes: (3, 3, K) those later, both of `base_axes`.
-
-    Returns:
-        (K, 3) N m s.
+    ``start`` (3, 3, 1) and ``axes`` (3, 3, K): the base's axes at the start and later, see
+    `base_axes`.
     """
     speeds = wheels.values("initial_speed")
     spin = np.sum(wheels.spin_momenta(speeds)[:, None] * wheels.unit_axes, axis=0)
@@ -167,9 +154,9 @@ def _largest(columns: Array, low: Array, high: Array) -> Array:
 class ThrusterTorques(NamedTuple):
     """The torques that thrusters can give together, as half-spaces ``normal . tau <= 1``."""
 
-    of_all: Array
+    torque_spaces: Array
     """(K, 3) 1/(N m): a torque within all of them can be had of thrusters that are partly open."""
-    of_mass: Array
+    mass_flow_spaces: Array
     """(L, 3) s/(N m): the largest ``normal . tau`` is the least propellant for it, kg/s."""
 
     @classmethod
@@ -190,11 +177,11 @@ class ThrusterTorques(NamedTuple):
 
     def share(self, torque: Array) -> Array:
         """(N,) share of what can be given in the direction of each torque (N, 3), N m."""
-        return _largest_product(self.of_all, torque)
+        return _largest_product(self.torque_spaces, torque)
 
     def propellant(self, torque: Array) -> Array:
         """(N,) kg/s, the least that gives each torque (N, 3), N m, were the valves continuous."""
-        return _largest_product(self.of_mass, torque)
+        return _largest_product(self.mass_flow_spaces, torque)
 
 
 def _half_spaces(torques: Array, low: Array, high: Array) -> Array:

@@ -181,8 +181,8 @@ def _compile_plants_in_lanes() -> None:
     advance: Any = advance_lanes
     measure: Any = measure_lanes
     layout, numbers = PlantMemory.layout(), (types.intp, types.float64)
-    of_flight = record_type(layout, WIDTH), block_type(layout, 1)
-    advance.compile((*of_flight, array_of_lanes(2), array_of_lanes(1), *numbers, MASK))
+    records = record_type(layout, WIDTH), block_type(layout, 1)
+    advance.compile((*records, array_of_lanes(2), array_of_lanes(1), *numbers, MASK))
     measure.compile((block_type(layout, WIDTH), *numbers))
 
 

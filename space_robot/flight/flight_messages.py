@@ -174,6 +174,28 @@ def record(flight: Flight, log: FlightLog, bag: Path) -> None:
         messages.stretch(log, 0, log.ticks, answered)
 
 
+def answers(
+    responder: StateResponder,
+    references: ReferenceBuffer,
+    codec: StateCodec,
+    parts: Iterable[tuple[topics.Topic, bytes]],
+    state: RobotState,
+) -> Iterator[tuple[topics.Topic, bytes]]:
+    """Yield the messages that answer a state, given by its parts; none if it is not taken.
+
+    It is decoded into ``state``, which has its tick once it is answered.
+    """
+    try:
+        tick, *_ = [codec.decode(topic, data, state) for topic, data in parts]
+    except MessageError:
+        return
+    if responder.judge_stamp(tick) != NEW:
+        return
+    reference = references.at(tick) if references.covers(tick) else references.hold(tick)
+    if reference is not None:
+        yield from responder.messages(tick, state, reference)
+
+
 class MessageLoop:
     """Closed loop of plant, mission and controller by messages; hands each to ``record``.
 
@@ -202,7 +224,7 @@ class MessageLoop:
         self._commands = CommandCodec(names.commanded, flight.timebase)
         self._exchange = PlantMessages(settings, names, flight.period, self._states, self._guard)
         self._references = ReferenceBuffer(robot.n)
-        self._answering = StateResponder(
+        self._responder = StateResponder(
             supervisor or flight.supervisor,
             LawChoice(flight.law, flight.swaps),
             self._references,
@@ -248,18 +270,11 @@ class MessageLoop:
         An answer that is asked for again is left out: the next one overtakes it, or is lost
         with it.
         """
-        state, references = self._state, self._references
-        try:
-            parts = zip(self._states.topics, sent.messages, strict=True)
-            stamp, *_ = [self._states.decode(topic, data, state) for topic, data in parts]
-        except MessageError:
-            return NO_TICK
-        if self._answering.judge_stamp(stamp) != NEW:
-            return NO_TICK
-        reference = references.at(stamp) if references.covers(stamp) else references.hold(stamp)
-        if reference is None:
-            return NO_TICK
-        for topic, message in self._answering.messages(stamp, state, reference):
+        parts, stamp = zip(self._states.topics, sent.messages, strict=True), NO_TICK
+        for topic, message in answers(
+            self._responder, self._references, self._states, parts, self._state
+        ):
+            stamp = self._state.tick
             self._record(topic, message)
             if topic is topics.COMMAND:
                 self._commands.decode(message, self._guard.offered)

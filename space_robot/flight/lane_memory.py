@@ -117,8 +117,8 @@ class LawInLanes:
         first = laws[0]
         assert isinstance(first, CompiledLaw)
         gains, self._memory = first.gains_type.lanes(n), first.memory_type.lanes(n)
-        of_lanes = [*laws, *[first] * (WIDTH - len(laws))]
-        for lane, law in enumerate(of_lanes):
+        all_laws = [*laws, *[first] * (WIDTH - len(laws))]
+        for lane, law in enumerate(all_laws):
             record_numbers(gains)[:, lane] = law.gains_block.view(np.float64)
             record_numbers(self._memory)[:, lane] = law.memory_block.view(np.float64)
         self._laws = laws
@@ -126,7 +126,7 @@ class LawInLanes:
             first.function(WIDTH),
             prefix(gains, SomeGains.dtype(n, WIDTH)),
             prefix(self._memory, LawMemory.dtype(n, WIDTH)),
-            np.ascontiguousarray(np.stack([law.h_bar for law in of_lanes], axis=-1)),
+            np.ascontiguousarray(np.stack([law.h_bar for law in all_laws], axis=-1)),
             first.estimate,
             first.needs_model,
             first.adds_inertia,

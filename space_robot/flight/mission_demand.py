@@ -73,12 +73,8 @@ def mission_demand(
 
     The robot begins with its momentum there, and its wheels with none from it.
 
-    Args:
-        robot: as the flight software knows it.
-        pieces: of the mission.
-        orbit: with the torques from outside; maybe none.
-        start_rate: (3,) rad/s, of the base at the start, base axes (None: that of the reference).
-            Where the reference has another one the momentum is asked for, no torque.
+    ``robot``: as the flight software knows it; ``start_rate``: (3,) rad/s of the base at the start,
+    base axes (None: the reference's); where it differs the momentum is asked for, no torque.
     """
     nominal = robot.nominal
     surroundings = Surroundings(nominal, orbit) if orbit.has_orbit else None
@@ -99,11 +95,11 @@ def mission_demand(
             outside, impulses = _outside(surroundings, asked, impulse)
             impulse = impulses[:, -1]
             asked = asked._replace(torque=asked.torque.copy())
-            for name, by_source, of_source in zip(SOURCES, outside, impulses, strict=True):
+            for name, by_source, source_impulse in zip(SOURCES, outside, impulses, strict=True):
                 countered = -to_base(axes, by_source.T).T
-                sources[name] = _source_demand(countered, -of_source)
+                sources[name] = _source_demand(countered, -source_impulse)
                 asked.torque[:, :3] += countered
-                asked.momentum[:] -= of_source
+                asked.momentum[:] -= source_impulse
         yield PieceDemand(piece, asked, sources)
 
 
@@ -159,10 +155,7 @@ class Surroundings:
     def torques(self, time: Array, quaternions: Array, joints: Array) -> Array:
         """Return torques (S, K, 3) about the centre of mass by `SOURCES`, N m, inertial axes.
 
-        Args:
-            time: (K,) s.
-            quaternions: (K, 4) of the base, unit.
-            joints: (K, n) rad or m.
+        ``time`` (K,) s; ``quaternions`` (K, 4) of the base, unit; ``joints`` (K, n) rad or m.
         """
         n, x = self._robot.joint_count, self._block[0]["x"]
         place = self._ephemeris.motion(time)

@@ -36,12 +36,8 @@ class StartStep(NamedTuple):
 def start_step(robot: Robot, settings: PlantSettings, mission: Mission) -> StartStep | None:
     """Return the step that a flight begins with; None: a small one, or none.
 
-    A base that floats freely has no desired attitude.
-
-    Args:
-        robot: that flies.
-        settings: of the plant, with the robot's place at tick 0.
-        mission: to be flown.
+    A base that floats freely has no desired attitude. ``settings`` of the plant have the robot's
+    place at tick 0.
     """
     (wanted,) = mission.chunk(0, 1).references()
     angle = rate = 0.0

@@ -22,11 +22,7 @@ class ChangedNumber(NamedTuple):
 
 
 def recorded_scenario(bag: Path) -> dict[str, Any]:
-    """Return the resolved scenario of a recorded flight.
-
-    Raises:
-        InputError: there is no bag, or it was recorded by a version that kept no scenario.
-    """
+    """Return the resolved scenario of a recorded flight."""
     flight = read_description(open_bag(bag).custom_data())
     if not isinstance(numbers := flight.get("scenario"), Mapping) or "robot_file" not in flight:
         raise InputError(f"{bag}: this bag does not hold its scenario: record the flight anew")

@@ -29,7 +29,7 @@ STOPS = {
     for node in _NODES
 }
 """Kinds of faults that stop a process for a while, by node."""
-NODE_OF = {kind: node for kinds in (KILLS, STOPS) for node, kind in kinds.items()}
+FAULTED_NODES = {kind: node for kinds in (KILLS, STOPS) for node, kind in kinds.items()}
 """Node affected by each kind of fault."""
 
 PROCESS_KINDS = by_name(*(kinds[node] for node in _NODES for kinds in (KILLS, STOPS)))

@@ -20,7 +20,7 @@ from space_robot_msgs_py.errors import InputError, explained_by
 from space_robot_sim.environment.disturbance_table import JSON, DisturbanceTable
 from space_robot_sim.faults.grammar import Fault, parse_faults
 
-from .faults import KINDS, NODE_OF, PROCESS_KINDS
+from .faults import FAULTED_NODES, KINDS, PROCESS_KINDS
 from .node_settings import FlightSettings, option_parameters
 from .objects import resolve_law, sampled
 from .options import OPTIONS
@@ -69,7 +69,7 @@ def _check_nodes(scenario: Scenario, faults: list[Fault]) -> None:
             if option.node == node and getattr(scenario, name) not in (option.default, None)
         ]
         asked += [f"{node}.{name}" for name in scenario.parameters.get(node, {})]
-        asked += [f"fault {fault}" for fault in faults if NODE_OF[fault.kind] == node]
+        asked += [f"fault {fault}" for fault in faults if FAULTED_NODES[fault.kind] == node]
         if asked:
             raise InputError(
                 f"{', '.join(asked)}: that is for the project's {node}, which `without` leaves out"

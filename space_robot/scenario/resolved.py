@@ -107,11 +107,7 @@ class ResolvedScenario(FlightSettings):
 
     @property
     def ticks(self) -> int:
-        """Number of ticks of the flight.
-
-        Raises:
-            InputError: the flight is too long, or the mission has no segments.
-        """
+        """Number of ticks of the flight."""
         duration, period = self.options.duration, self.plant.period
         if duration is None:
             duration = self.reference.duration
@@ -301,12 +297,7 @@ class Robots:
 
     @classmethod
     def read(cls, settings: FlightSettings, robot: Any, plant_robot: Any = None) -> Robots:
-        """Read the robots.
-
-        Args:
-            settings: of the nodes, which name the robots.
-            robot: option of the flight.
-            plant_robot: option of the flight; the plant's robot, overriding its settings.
+        """Read the robots that settings of nodes name, or that options of the flight are.
 
         Raises:
             InputError: a robot does not exist, or its joints differ from the plant's.

@@ -63,8 +63,8 @@ def ros_domain(
 
 def domain_asked_for(domain: int | None) -> int | None:
     """Return ``domain``, or the user's ROS_DOMAIN_ID; None if neither is set."""
-    of_user = os.environ.get("ROS_DOMAIN_ID", "")
-    return int(of_user) if domain is None and of_user.isdecimal() else domain
+    chosen = os.environ.get("ROS_DOMAIN_ID", "")
+    return int(chosen) if domain is None and chosen.isdecimal() else domain
 
 
 def _free_domain(namespace: str) -> tuple[int, FileLock]:
@@ -143,13 +143,13 @@ def refuse_publishers(
     node: Any,
     joined_at: float,
     names: Sequence[str],
-    of_others: Collection[topics.Topic],
+    foreign: Collection[topics.Topic],
     check: Callable[[], None],
 ) -> None:
     """Wait until all earlier nodes are discovered; refuse those that publish a flight's topics.
 
     ``joined_at``: when ``node`` was made, by the monotonic clock; ``names``: of the flight's nodes;
-    ``of_others``: topics that the user's nodes publish.
+    ``foreign``: topics that the user's nodes publish.
     """
     from space_robot_msgs_py.ros.endpoints import full_name_of
 
@@ -161,7 +161,7 @@ def refuse_publishers(
         check()
         time.sleep(POLL_S)
         is_discovered = time.monotonic() >= joined_at + DISCOVERY_S
-        for topic in (topic for topic in topics.RECORDED if topic not in of_others):
+        for topic in (topic for topic in topics.RECORDED if topic not in foreign):
             infos = node.get_publishers_info_by_topic(topic.name)
             if others := sorted({full_name_of(info) for info in infos} - own):
                 raise InputError(

@@ -15,7 +15,7 @@ from space_robot_sim.plant.pacing import PAUSED
 
 from ...console.progress import FlightProgress, flight_progress
 from ...processes.interruption import exit_code
-from ...scenario.faults import KILLS, NODE_OF
+from ...scenario.faults import FAULTED_NODES, KILLS
 from ..plan import Flight
 from .domain import refuse_publishers
 from .monitor import Event, Monitor
@@ -120,7 +120,7 @@ class _Follower:
         faults = flight.scenario.process_faults
         self._injector = Injector(faults, graph)
         self._fault_kinds = frozenset(fault.kind.name for fault in faults)
-        self._planned = frozenset(NODE_OF[fault.kind] for fault in faults)
+        self._planned = frozenset(FAULTED_NODES[fault.kind] for fault in faults)
         self._gone: set[str] = set()
         self._has_flown = False
         self._restarts = 0
@@ -134,9 +134,9 @@ class _Follower:
         show(0.0, "configuring the nodes")
         self._change(self._names, "configure")
         if not is_empty:
-            of_others = published_topics(self._options.without)
+            foreign = published_topics(self._options.without)
             node = self._monitor.node
-            refuse_publishers(node, self._joined_at, self._names, of_others, self._check_start)
+            refuse_publishers(node, self._joined_at, self._names, foreign, self._check_start)
         for name in self._names:
             self._change([name], "activate")
         show.say(
@@ -279,8 +279,8 @@ def _remark(
     if errors is None:
         return speed
     # the law of a free base sees no error of its attitude
-    of_base = f"attitude {errors[0]:.1e} deg, " if errors[0] else ""
-    return f"{speed}errors: {of_base}joints {errors[1]:.1e} {unit}"
+    attitude = f"attitude {errors[0]:.1e} deg, " if errors[0] else ""
+    return f"{speed}errors: {attitude}joints {errors[1]:.1e} {unit}"
 
 
 class Injector:
@@ -309,7 +309,7 @@ class Injector:
         return events
 
     def _inject(self, fault: Fault, simulated_s: float) -> Event:
-        node = NODE_OF[fault.kind]
+        node = FAULTED_NODES[fault.kind]
         if fault.kind == KILLS[node]:
             self._graph.nodes[node].signal(signal.SIGKILL)
             return Event(simulated_s, f"{node}_node", "killed (SIGKILL)")

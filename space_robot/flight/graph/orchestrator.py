@@ -80,12 +80,12 @@ def fly(
             _say(f"flying on ROS_DOMAIN_ID={domain}{within}, recording to {bag}")
             for remark in filter(None, (*remarks, bag_remark(flight))):
                 _say(remark)
-            parameters = flight_parameters(flight, bag)
-            if flight.scenario.process_faults:  # injected by the clock that the monitor hears
-                parameters["plant"]["wait_for"].append(f"{own_name(MONITOR)}:{topics.CLOCK.name}")
             with ScratchFolder() as scratch:
                 folder = Path(scratch)
-                parameters = with_files(parameters, flight, folder)
+                parameters = flight_parameters(flight, bag, folder)
+                if flight.scenario.process_faults:  # injected by the clock that the monitor hears
+                    clock = f"{own_name(MONITOR)}:{topics.CLOCK.name}"
+                    parameters["plant"]["wait_for"].append(clock)
                 commands = _commands(flight, parameters, folder)
                 with Graph(commands, node_environment(domain)) as graph:
                     what_happened = follow(
@@ -151,8 +151,11 @@ def require_ros() -> None:
         raise missing from None
 
 
-def flight_parameters(flight: Flight, bag: Path) -> dict[str, dict[str, Any]]:
-    """Return the parameters of every node of a flight that is recorded to ``bag``."""
+def flight_parameters(flight: Flight, bag: Path, folder: Path) -> dict[str, dict[str, Any]]:
+    """Return the parameters of every node of a flight that is recorded to ``bag``.
+
+    The files that they name are written to ``folder``.
+    """
     parameters = {node: dict(values) for node, values in flight.scenario.parameters.items()}
     options = flight.scenario.options
     absent = [f"{node}_node" for node in options.without]
@@ -169,6 +172,19 @@ def flight_parameters(flight: Flight, bag: Path) -> dict[str, dict[str, Any]]:
     parameters["recorder"] |= {"bag": str(bag.absolute()), "flight": json.dumps(flight.description)}
     if options.composed and "drain_period" not in options.parameters.get("recorder", {}):
         parameters["recorder"]["drain_period"] = COMPOSED_DRAIN_S
+    numbers = flight.scenario.tree
+    for node in ("plant", "controller", "mission"):
+        option = "plant_robot" if node == "plant" and "plant_robot" in numbers else "robot"
+        values = parameters[node]
+        robot = values.get("robot")
+        if option == "plant_robot" or robot == GIVEN:
+            if node == "plant" and not values.get("mission"):  # that of the assumed robot
+                values["mission"] = str(robot_files(str(robot)).mission or "")
+            values["robot"] = _write(folder / f"{option}.yaml", numbers[option])
+    if parameters["controller"].get("actuators") == GIVEN or "assumed_actuators" in numbers:
+        assumed = flight.scenario.assumed_actuators.model_dump(mode="json")
+        content = {"plant_node": {"ros__parameters": assumed}}
+        parameters["controller"]["actuators"] = _write(folder / "assumed_actuators.yaml", content)
     return parameters
 
 
@@ -194,24 +210,6 @@ def _say(text: str) -> None:
     click.echo(text, err=True)
 
 
-def with_files(parameters: Parameters, flight: Flight, folder: Path) -> dict[str, dict[str, Any]]:
-    """Write the files that nodes read, and return parameters that name them."""
-    named = {node: dict(values) for node, values in parameters.items()}
-    numbers = flight.scenario.tree
-    for node in ("plant", "controller", "mission"):
-        option = "plant_robot" if node == "plant" and "plant_robot" in numbers else "robot"
-        robot = named[node].get("robot")
-        if option == "plant_robot" or robot == GIVEN:
-            if node == "plant" and not named[node].get("mission"):  # that of the assumed robot
-                named[node]["mission"] = str(robot_files(str(robot)).mission or "")
-            named[node]["robot"] = _write(folder / f"{option}.yaml", numbers[option])
-    if named["controller"].get("actuators") == GIVEN or "assumed_actuators" in numbers:
-        assumed = flight.scenario.assumed_actuators.model_dump(mode="json")
-        content = {"plant_node": {"ros__parameters": assumed}}
-        named["controller"]["actuators"] = _write(folder / "assumed_actuators.yaml", content)
-    return named
-
-
 def _write(path: Path, content: Any) -> str:
     path.write_text(yaml.safe_dump(content, sort_keys=False), encoding="utf-8")
     return str(path)
@@ -222,7 +220,7 @@ def launched_parameters(
     bag: Path,
     autostart: bool,
     folder: Path,
-    of_ros: Mapping[str, Mapping[str, Any]],
+    ros_parameters: Mapping[str, Mapping[str, Any]],
 ) -> Path:
     """Write a ROS parameter file for launched nodes, and the files it names; return its path.
 
@@ -233,14 +231,13 @@ def launched_parameters(
         bag: the folder to record to.
         autostart: whether the nodes configure and activate themselves; they wait for one another.
         folder: for the files.
-        of_ros: parameters by node that every ROS node has.
+        ros_parameters: parameters by node that every ROS node has.
     """
     check_bag_path(bag)
     compile_kernels(bool(flight.plant.names.actuators))
-    parameters = with_files(flight_parameters(flight, bag), flight, folder)
     started = {
-        node: {**values, "autostart": autostart, **of_ros.get(node, {})}
-        for node, values in parameters.items()
+        node: {**values, "autostart": autostart, **ros_parameters.get(node, {})}
+        for node, values in flight_parameters(flight, bag, folder).items()
     }
     return write_parameters(started, folder / "parameters.yaml")
 

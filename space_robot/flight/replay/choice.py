@@ -94,13 +94,13 @@ class ControllerChoice:
         self.law_name = law.name
         is_same_law = law.name == flight.get("controller", law.name)
         recorded_gains = flight.get("gains_used", {})
-        own, of_laws = split_gains(flown)
+        own, law_gains = split_gains(flown)
         self.parameters: dict[str, Any] = {**dict(flatten(own)), **self._robot(flown)}
         """By dotted name, gains included."""
         if not gains:
             if recorded_gains and is_same_law:
-                of_laws = {law.name: dict(recorded_gains), **of_laws}
-            self.parameters |= self._recorded_gains(of_laws)
+                law_gains = {law.name: dict(recorded_gains), **law_gains}
+            self.parameters |= self._recorded_gains(law_gains)
         if "actuators" not in self._overrides:
             self.parameters |= self._actuators(flown)
         if "navigation_sensors" not in self._overrides:
@@ -173,9 +173,9 @@ class ControllerChoice:
         _write(path, {"plant_node": {"ros__parameters": content}})
         return {"actuators": str(path)}
 
-    def _recorded_gains(self, of_laws: Mapping[str, Tree]) -> dict[str, Any]:
-        parameters = dict(flatten(of_laws))
-        if of_laws and set(map(_swap_law, self._flown_swaps)) <= set(of_laws):
+    def _recorded_gains(self, law_gains: Mapping[str, Tree]) -> dict[str, Any]:
+        parameters = dict(flatten(law_gains))
+        if law_gains and set(map(_swap_law, self._flown_swaps)) <= set(law_gains):
             parameters["gains"] = self.gains_name if self._has_gain_set() else DEFAULT
         return parameters
 

@@ -145,15 +145,10 @@ class Comparison:
         forces: Collection[str] = (),
         dipoles: Collection[str] = (),
     ) -> None:
-        """Compare recorded and replayed commands.
+        """Compare the commands of the ticks ``played``, whose state was sent to the controller.
 
-        Args:
-            axis_names: of all that is commanded.
-            played: the ticks whose state was sent to the controller.
-            recorded: in flight.
-            replayed: now.
-            forces: the axes whose commands are in N: of prismatic joints and thrusters.
-            dipoles: those whose commands are in A m2: magnetic torquers.
+        ``forces``: names of prismatic joints and thrusters, in N; ``dipoles``: of magnetic
+        torquers, in A m2.
         """
         self.axis_names = axis_names
         units = {**dict.fromkeys(forces, "N"), **dict.fromkeys(dipoles, "A m2")}

@@ -18,7 +18,6 @@ from numpy.typing import NDArray
 
 from space_robot_control.controller.reference_buffer import ReferenceBuffer
 from space_robot_control.controller.supervisor import StateResponder
-from space_robot_control.controller.tick import NEW
 from space_robot_control.laws.base import LawError
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.bag.law_history import as_data, within
@@ -34,6 +33,7 @@ from space_robot_msgs_py.wire.telemetry import ReferenceCodec
 from ...console.progress import flight_progress
 from ...processes.scratch_folder import ScratchFolder
 from ..compilation import compile_kernels
+from ..flight_messages import answers
 from .choice import ControllerChoice
 from .comparison import CommandList, Comparison
 from .recording import Recording, StateMessages
@@ -264,18 +264,10 @@ class ReplayedController:
         """Answer a state, if the controller takes it."""
         for stream in self._streams:
             stream.feed(state.tick)
-        try:
-            for topic, data in zip(self._states.control_topics, state.messages, strict=True):
-                self._states.decode(topic, data, self._state)
-        except MessageError:
-            return
-        tick, references = state.tick, self._references
-        if self._responder.judge_stamp(tick) != NEW:
-            return
-        reference = references.at(tick) if references.covers(tick) else references.hold(tick)
-        if reference is None:
-            return
-        for topic, data in self._responder.messages(tick, self._state, reference):
+        parts = zip(self._states.control_topics, state.messages, strict=True)
+        for topic, data in answers(
+            self._responder, self._references, self._states, parts, self._state
+        ):
             if topic is topics.COMMAND:
                 self.answers.add(data)
 

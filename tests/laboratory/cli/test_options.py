@@ -185,12 +185,12 @@ def test_nodes_of_ones_own_take_the_places_of_those_that_are_not_started(tmp_pat
     values = {"without": "controller mission", "join_timeout": "5", "bag": str(tmp_path / "bag")}
     flight, bag, _ = launched_flight(values)
     assert started_nodes(flight.scenario.options.without) == ("recorder_node", "plant_node")
-    parameters = flight_parameters(flight, bag)["plant"]
+    parameters = flight_parameters(flight, bag, tmp_path)["plant"]
     assert (parameters["own_controller"], parameters["join_timeout"]) == (True, 5.0)
     assert parameters["reset_with"] == ["recorder_node"]
     assert {entry.partition(":")[0] for entry in parameters["wait_for"]} == {"recorder_node"}
     flight, bag, _ = launched_flight({**values, "without": "mission"})
-    assert flight_parameters(flight, bag)["controller"]["join_timeout"] == 5.0
+    assert flight_parameters(flight, bag, tmp_path)["controller"]["join_timeout"] == 5.0
 
 
 def test_a_parameter_file_goes_over_the_arguments_and_into_the_bag(tmp_path: Path) -> None:

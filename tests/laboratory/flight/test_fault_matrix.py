@@ -124,7 +124,7 @@ def seen(name: str) -> Seen:
         def fly_tick(self) -> None:
             tick = flight.plant.tick
             super().fly_tick()
-            supervisor = self._answering.supervisor
+            supervisor = self._responder.supervisor
             counts.update(plant=self._guard.refused, controller=supervisor.rejected)
             safe = f"{MODES[supervisor.mode]}: {supervisor.reason}"
             for node, mode in (

@@ -114,7 +114,7 @@ def test_lists_go_to_the_nodes_as_declared(tmp_path: Path) -> None:
     """ROS takes no list of whole and decimal numbers."""
     parameters = {"plant": {"initial_quaternion": [0.9, 1, 0, 0], "case": 2}}
     flight = planned(duration=0.05, parameters=parameters)
-    sent = flight_parameters(flight, tmp_path / "bag")["plant"]
+    sent = flight_parameters(flight, tmp_path / "bag", tmp_path)["plant"]
     assert json.dumps(sent["initial_quaternion"]) == "[0.9, 1.0, 0.0, 0.0]"
     assert sent["case"] == "2"
 
