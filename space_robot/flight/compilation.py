@@ -51,7 +51,7 @@ def compile_kernels(with_allocation: bool = False) -> None:
         _compile_flights()
         mark.touch()
     if with_allocation and not (mark := mark_file(ALLOCATION_MARK)).exists():
-        with _compiling("the allocation", allocate):
+        with compiling("the allocation", allocate):
             allocation_code(is_used=True)
         mark.touch()
 
@@ -99,7 +99,7 @@ def _compiled_laws() -> dict[str, type[CompiledLaw]]:
 
 
 @contextmanager
-def _compiling(what: str, *kernels: Any, again: bool = False) -> Iterator[None]:
+def compiling(what: str, *kernels: Any, again: bool = False) -> Iterator[None]:
     """Show the progress; ``again``: the kernels have been compiled for other types before."""
     from ..console.progress import watching_progress  # only once an installation
 
@@ -115,7 +115,7 @@ def _compile_flights() -> None:
     from .simulate import fly_ticks, simulate  # nodes load kernels without it
 
     own = [law.kernel for law in _compiled_laws().values()]
-    with _compiling("the dynamics and the laws", fly_ticks, read, write, *own):
+    with compiling("the dynamics and the laws", fly_ticks, read, write, *own):
         helper_command = module_command(__name__, "answers")
         with child_process(helper_command, stdout=subprocess.DEVNULL) as helper:
             _step_plant(Flight(resolve(Scenario())))
@@ -156,7 +156,7 @@ def _compile_lanes() -> None:
 
     own = [law.kernel for law in _compiled_laws().values()]
     kernels = (fly_lanes, measure_lanes, fly_benches, *own)
-    with _compiling("flights that fly together", *kernels, again=True):
+    with compiling("flights that fly together", *kernels, again=True):
         with child_process(module_command(__name__, "plants")) as helper:
             _compile_controllers_in_lanes()
             helper.wait()
