@@ -120,13 +120,7 @@ def add_actuators(
 ) -> list[Move]:
     """Draw wheels and thrusters on a robot's base; return what moves them.
 
-    Args:
-        scene: of a server.
-        base: name of the base in the scene.
-        robot: that flew.
-        log: the flight.
-        times: (K,) of the frames, s.
-        dark: whether the page is light on dark.
+    ``base`` is the name of the base in the scene, ``times`` (K,), s, are those of the frames.
     """
     flown, moves = described_actuators(log), list[Move]()
     if not (flown.wheel_count or flown.thruster_count):

@@ -58,14 +58,10 @@ def animate(
     dark: bool,
     advance: Callable[[int], Callable[[], None]],
 ) -> str:
-    """Return the page of an animated scene of flights.
+    """Return the page of an animated scene of flights with frames at ``times`` (K,), s.
 
-    Args:
-        flights: to be shown.
-        times: (K,) of the frames, s.
-        side_by_side: whether the robots are side by side instead of overlapping.
-        dark: whether the page is light on dark.
-        advance: called with the number of frames, then after each frame.
+    The robots are side by side or overlap. ``advance`` is called with the number of frames; what
+    it returns after each frame.
 
     Raises:
         InputError: viser is not installed, or a flight has no state.

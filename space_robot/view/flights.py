@@ -119,13 +119,9 @@ def flights_page(
     options: ViewOptions,
     advance: Callable[[int], Callable[[], None]],
 ) -> str:
-    """Return the self-contained page of flights.
+    """Return the self-contained page of flights, at least one, and the robots that flew, by name.
 
-    Args:
-        logs: by name, at least one.
-        robots: that flew, by the same names.
-        options: of the page.
-        advance: called with the number of frames, then after each frame.
+    ``advance`` is called with the number of frames; what it returns after each frame.
 
     Raises:
         InputError: viser is not installed, or a flight has no state.
@@ -226,15 +222,10 @@ def flight_plots(
     colours: Sequence[str],
     kinds: Sequence[str] = (),
 ) -> tuple[Array, list[Plot]]:
-    """Return the common times, s, and the plots of some flights.
+    """Return the common times, s, and the plots of some flights, ``kinds`` of which come first.
 
-    For one flight each axis is drawn, for several the magnitude of each quantity.
-
-    Args:
-        flights: by name.
-        robots: that flew, by the same names.
-        colours: of the flights; for one flight those of the axes.
-        kinds: of the plots that are shown first; empty: the usual ones.
+    For one flight each axis is drawn, for several the magnitude of each quantity; the colours are
+    those of the axes, or of the flights. Without ``kinds`` the usual plots are shown.
     """
     start = min(float(log.time[0]) for log in flights.values())
     end = max(float(log.time[-1]) for log in flights.values())
@@ -280,15 +271,10 @@ def _axis_series(
 
 
 def extremes(log: FlightLog, values: Array, edges: Array) -> Array:
-    """Return minimum and maximum of the values in each time interval, alternating.
+    """Return minimum and maximum (2 K,) of the values in each time interval, alternating.
 
-    Args:
-        log: with the ticks of the values.
-        values: (N,), NaN where unknown.
-        edges: (K + 1,) of the intervals, s; the last one includes all later ticks.
-
-    Returns:
-        (2 K,), NaN for intervals without a known value.
+    The values (N,) of a log's ticks, and the extremes, are NaN where unknown. The last interval
+    between the edges (K + 1,), s, includes all later ticks.
     """
     starts = np.searchsorted(log.time, edges[:-1])
     lowest_and_highest = np.full((len(starts), 2), np.nan)

@@ -17,7 +17,7 @@ from space_robot_msgs_py.errors import InputError
 from ..analysis.errors import controls_base
 
 Array = NDArray[np.float64]
-Rows = NDArray[np.intp]
+RowIndices = NDArray[np.intp]
 Move = Callable[[int], None]
 """Updates a part of a scene to the k-th frame; called for k = 0, 1, ..."""
 
@@ -93,7 +93,7 @@ def shown_times(logs: Sequence[FlightLog], rate: float) -> Array:
     return times
 
 
-def held_rows(log: FlightLog, columns: Sequence[str], times: Array) -> Rows:
+def held_rows(log: FlightLog, columns: Sequence[str], times: Array) -> RowIndices:
     """Return the rows (K,) of a flight to be shown at ``times``: the last with all ``columns``.
 
     Before the first complete row it is that one; (0,) if no row is complete.
@@ -102,14 +102,14 @@ def held_rows(log: FlightLog, columns: Sequence[str], times: Array) -> Rows:
     return known[frame_rows(log, times, known)] if len(known) else known
 
 
-def frame_rows(log: FlightLog, times: Array, rows: Rows | slice = slice(None)) -> Rows:
+def frame_rows(log: FlightLog, times: Array, rows: RowIndices | slice = slice(None)) -> RowIndices:
     """Return the number of the last of a flight's ``rows`` at or before each time, or 0."""
     # times are rounded: the nearest tick is meant
     due = times + 0.5 * log.timebase.period
     return np.asarray(np.maximum(np.searchsorted(log.time[rows], due, side="right") - 1, 0))
 
 
-def _desired(log: FlightLog, robot: Robot, rows: Rows) -> Array | None:
+def _desired(log: FlightLog, robot: Robot, rows: RowIndices) -> Array | None:
     """Return the first tool's desired positions, (K, 3) m, with passive joints at rest."""
     if not controls_base(log):
         return None

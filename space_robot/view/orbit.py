@@ -125,11 +125,9 @@ def sun_direction(log: FlightLog) -> Array | None:
 
 
 def is_in_shadow(position: Array, sun: Array | None) -> Mask:
-    """Return whether positions are in the Earth's shadow, a cylinder as in the simulation.
+    """Return whether positions (K, 3), m, from the Earth's centre are in its shadow.
 
-    Args:
-        position: (K, 3) from the Earth's centre, m.
-        sun: (3,) unit vector to the Sun; None: nothing is in a shadow.
+    It is a cylinder, as in the simulation; without a unit vector (3,) to the Sun there is none.
     """
     if sun is None:
         return np.zeros(len(position), bool)

@@ -46,10 +46,9 @@ def palette(dark: bool) -> tuple[str, ...]:
 
 @contextmanager
 def local_server(port: int = 0) -> Iterator[ViserServer]:
-    """Serve scenes to browsers on this machine only, on 127.0.0.1, without output.
+    """Serve scenes to browsers of this machine, on 127.0.0.1, without output.
 
-    Args:
-        port: to listen on; the next free one if it is in use. 0: any.
+    If the ``port`` is in use it is the next free one; 0: any.
     """
     from rich import get_console
     from viser import ViserServer

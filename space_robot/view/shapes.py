@@ -259,11 +259,8 @@ def bounding_boxes(robot: Robot) -> list[BoundingBox]:
 def extent(robot: Robot, position: Array, quaternion: Array, joint_positions: Array) -> Array:
     """Return the corners of a robot's shapes in some poses, (K, 3) m, inertial frame.
 
-    Args:
-        robot: with its visuals.
-        position: (T, 3) of the base, m.
-        quaternion: (T, 4) of the base.
-        joint_positions: (T, N) of all joints, rad or m.
+    Position (T, 3), m, and quaternion (T, 4) are the base's, positions (T, N), rad or m, those of
+    all joints.
     """
     frames = {f.body: f for f in body_frames(robot, base_axes(quaternion.T), joint_positions.T)}
     corners = []

@@ -88,14 +88,10 @@ def set_stage(
     orbit: OrbitFrames | None = None,
     side: Array = SIDES[0],
 ) -> Stage:
-    """Add stars, axes, lights and the initial camera for some points.
+    """Add stars, axes, lights and the initial camera, to which all points are visible.
 
-    Args:
-        server: of the scene.
-        points: (K, 3) that must be visible, m, inertial frame.
-        dark: whether the page is light on dark.
-        orbit: of a scene in orbit.
-        side: (3,) of `SIDES`, where camera and lights are.
+    The ``points`` (K, 3) are in m, inertial frame; camera and lights are on a ``side`` (3,) of
+    `SIDES`.
     """
     scene, camera = server.scene, server.initial_camera
     axes = orbit.axes if orbit else np.eye(3)
@@ -194,12 +190,8 @@ def clearest_side(
 ) -> Array:
     """Return the first of `SIDES` where the base hides at most `MOST_HIDDEN` of the arms.
 
-    Or, if there is none, the one where it hides least.
-
-    Args:
-        flights: robots with the attitudes (T, 4) of their bases and the positions (T, N) of all
-            their joints, rad or m.
-        orbit: of a scene in orbit.
+    Or, if there is none, the one where it hides least. The flights are robots with the attitudes
+    (T, 4) of their bases and the positions (T, N) of all their joints, rad or m.
     """
     shares = []
     for side in SIDES:

@@ -53,13 +53,7 @@ def add_targets(
 ) -> list[Move]:
     """Draw each target of a flight as a box of uniform density; return what moves them.
 
-    Args:
-        scene: of a server.
-        root: name of the robot in the scene.
-        robot_scene: the robot that holds it.
-        log: the flight.
-        robot: that flew.
-        times: (K,) of the frames, s.
+    ``root`` is the name of the robot in the scene, ``times`` (K,), s, are those of the frames.
     """
     moves: list[Move] = []
     try:
@@ -245,10 +239,10 @@ def _hand(
 
 
 def held_poses(grasp: Grasp, log: FlightLog, robot: Robot) -> tuple[Array, Array]:
-    """Return the poses of a grasped target in each row of a log.
+    """Return the poses of a grasped target in each row of a log, inertial frame.
 
-    Returns:
-        (N, 3) centre of mass, m, inertial frame; (N, 3, 3) rotation matrices of the grasping body.
+    They are its centre of mass (N, 3), m, and the rotation matrices (N, 3, 3) of the body that
+    holds it.
     """
     axes = base_axes(log.quaternion.T)
     frames = body_frames(robot, axes, log.all_positions.T)
