@@ -45,7 +45,7 @@ THICK, THIN = 0.024, 0.085
 """Radius of a plume at the nozzle and at its end, relative to the same."""
 NOZZLE, STRUT = (0.012, 0.03, 0.07), 0.008
 """Radii of throat and exit of a nozzle, and its length, relative to the same; radius of the strut
-that holds it beside the base."""
+that holds it off the base."""
 SHORTEST = 2.0**-7
 """Resolution of a plume's length, relative to the longest; shorter ones are not drawn."""
 SIDES, RINGS = 12, 5

@@ -69,7 +69,7 @@ class OrbitFrames:
     velocity: Array
     """(K, 3) of the same, m/s."""
     sun: Array | None
-    """(3,) unit vector to the Sun; None: the flight has no sunlight, or does not tell."""
+    """(3,) unit vector to the Sun; None: the flight has no sunlight, or does not say."""
     is_dark: Mask
     """(K,) whether the robot is in the Earth's shadow."""
 
@@ -116,7 +116,7 @@ def is_in_orbit(log: FlightLog) -> bool:
 
 
 def sun_direction(log: FlightLog) -> Array | None:
-    """Return the unit vector (3,) to the Sun; None: no sunlight acts, or the bag does not tell."""
+    """Return the unit vector (3,) to the Sun; None: no sunlight acts, or the bag does not say."""
     try:
         settings = orbit_of(log)
     except InputError:
