@@ -101,7 +101,7 @@ def reproduce(
 def _summary(record: dict[str, Any], out: Path) -> None:
     from ..console.terminal import say, terminal
     from ..console.terminal_tables import print_table
-    from ..paper.comparison import claims_table
+    from ..paper.reproduce import claims_table
 
     console = terminal()
     if record["claims"]:

@@ -1,33 +1,48 @@
-"""Runs the complete reproduction: flights, comparison, figures, folder of results."""
+"""The complete reproduction: flights, compared with Table V and claims, in a folder of results."""
 
 from __future__ import annotations
 
 import json
 import platform
 import shutil
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
+from typing import Any, NamedTuple
 
 from matplotlib.figure import Figure
 
-from space_robot.analysis.page import template
 from space_robot_msgs_py.config.installation import config_directory
 from space_robot_msgs_py.errors import InputError
 
 from ..analysis import figures as drawn
 from ..analysis.figures.figure_set import FigureFolder, SavedFigure
 from ..analysis.figures.flight_curves import BaseTorque
+from ..analysis.page import template
 from ..console.files import csv_writer
-from ..console.tables import as_markdown
+from ..console.tables import Column, JudgedCell, Table, as_markdown
 from ..flight.flown_log import empty_log
 from ..flight.plan import Flight, Scenario, resolve
 from ..processes.executor import run_all
 from ..processes.software import commit, versions
-from .comparison import Cell, cells, chatter, chatter_table, claims, claims_table, variant_tables
-from .flights import PERFECT, ROBOT, Equipment, Result, TableRow, Variant, fly, plan
+from .flights import (
+    CHATTER,
+    COLUMNS,
+    DEFINITIONS,
+    HEADINGS,
+    PERFECT,
+    PRINTED,
+    ROBOT,
+    TORQUE,
+    TRACKING,
+    VARIANTS,
+    Equipment,
+    Result,
+    TableRow,
+    fly,
+    plan,
+)
 
 TABLE = "table_v"
 ERRATA = "docs/explanation/errata.md"
@@ -41,6 +56,157 @@ COMPARISONS: dict[str, tuple[str, Callable[[Mapping[str, BaseTorque]], Figure]]]
 }
 """Caption and drawing function of the figures of all laws, by file name."""
 FIGURE_OF_CASE = {"1": "6", "2": "7", "3": "8", "4-1": "9a", "4-2": "9b"}
+TDE_LAWS = ("tde_smc", "tde_tsmc", "tde_stc")
+SMOOTHER = "TDE-STC is smoother, printed gains, ideal sensors: base torque's total variation, "
+SMOOTHNESS = {
+    ("tde_tsmc", "printed"): (f"{SMOOTHER}tde_tsmc / tde_stc", 5.0),
+    ("tde_smc", "printed"): (f"{SMOOTHER}tde_smc / tde_stc", 100.0),
+    ("tde_tsmc", "tuned"): (
+        "TDE-STC is the smoothest TDE law whatever the gains: tde_tsmc tuned / tde_stc",
+        1.0,
+    ),
+}
+"""The paper's claims on other laws' variation, relative to that of TDE-STC: text, smallest."""
+
+
+class Cell(NamedTuple):
+    """One number of Table V and the measured value."""
+
+    controller: str
+    case: str
+    gains: str
+    friction: bool
+    definition: str
+    column: str
+    measured: float | None
+    """Measured value; None if the flight diverged."""
+    printed: float
+    ratio: float | None
+    diverged_tick: int | None
+
+    @property
+    def text(self) -> str:
+        """``measured / printed (ratio)``."""
+        if self.measured is None or self.ratio is None:
+            return f"diverged at tick {self.diverged_tick}"
+        spec = ".4f" if "torque" in self.column else ".2e"
+        ratio = f"{self.ratio:.3f}" if self.ratio > 0.01 else f"{self.ratio:.1e}"
+        return f"{self.measured:{spec}} / {self.printed:{spec}} ({ratio})"
+
+
+def compare_with_table(results: Iterable[Result]) -> list[Cell]:
+    """Compare every flight with Table V in every column, by both definitions."""
+    cells = []
+    for row, variant, _, diverged_tick, metrics, _ in results:
+        for definition in DEFINITIONS:
+            for column, printed in zip(COLUMNS, PRINTED[row], strict=True):
+                measured = metrics[f"{column}.{definition}"] if metrics else None
+                ratio = None if measured is None else measured / printed
+                numbers = measured, printed, ratio, diverged_tick
+                cells.append(Cell._make((*row, *variant, definition, column, *numbers)))
+    return cells
+
+
+def variant_tables(comparison: Sequence[Cell]) -> Iterator[Table]:
+    """Tabulate each variant and definition."""
+    columns = (
+        Column("controller", is_label=True),
+        Column("case", is_label=True),
+        *(Column(*heading) for heading in HEADINGS.values()),
+    )
+    for definition, meaning in DEFINITIONS.items():
+        for variant in VARIANTS:
+            rows: dict[tuple[str, str], list[str]] = {}
+            for cell in comparison:
+                if (cell.gains, cell.friction, cell.definition) == (*variant, definition):
+                    row = cell.controller, cell.case
+                    rows.setdefault(row, [*row]).append(cell.text)
+            if rows:
+                yield Table.of(f"{variant.title}; {meaning}", columns, list(rows.values()))
+
+
+def chatter_table(flights: Iterable[dict[str, Any]]) -> Table:
+    """Tabulate the chatter of flights, as `reproduce` returns it."""
+    names = ("base", "joints 1-3", "joints 4-6")
+    columns = (
+        Column("controller", is_label=True),
+        Column("gains", is_label=True),
+        *(Column(f"{name}: variation", "N m/s", ".3g") for name in names),
+        *(Column(f"{name}: power > 100 Hz", spec=".1e") for name in names),
+    )
+    rows = [
+        [x["controller"], x["gains"], *(x[key][column] for key in CHATTER for column in TORQUE)]
+        for x in flights
+    ]
+    return Table.of("Chatter in case 1, printed friction", columns, rows)
+
+
+class Claim(NamedTuple):
+    """A claim of the paper as an inequality between ``value`` and ``limit``."""
+
+    text: str
+    value: float
+    relation: str
+    """``<=`` or ``>=``."""
+    limit: float
+
+    @property
+    def holds(self) -> bool:
+        """True if the inequality is met."""
+        return self.value <= self.limit if self.relation == "<=" else self.value >= self.limit
+
+
+def claims_table(records: Iterable[dict[str, Any]]) -> Table:
+    """Tabulate claims, as `reproduce` returns them, each with its verdict."""
+    columns = (
+        Column("claim", is_label=True),
+        Column("measured", spec=".4g"),
+        Column("limit"),
+        Column(is_label=True),
+    )
+    verdicts = {True: JudgedCell("", "holds", "good"), False: JudgedCell("", "fails", "bad")}
+    rows = [
+        [c["text"], c["value"], f"{c['relation']} {c['limit']:g}", verdicts[c["holds"]]]
+        for c in records
+    ]
+    return Table.of("", columns, rows)
+
+
+def judge_claims(results: Iterable[Result], comparison: Iterable[Cell]) -> list[Claim]:
+    """Return every claim whose flights are among the results."""
+    return [
+        Claim(text, max(values), relation, limit)
+        for text, values, relation, limit in _judged(results, comparison)
+        if values
+    ]
+
+
+def _judged(
+    results: Iterable[Result], comparison: Iterable[Cell]
+) -> Iterator[tuple[str, list[float], str, float]]:
+    """Yield text, values of which the largest counts, relation and limit of each claim."""
+    cells = [c for c in comparison if (c.definition, c.gains) == ("rms", "printed") and c.ratio]
+    free = [c for c in cells if c.controller == "tde_stc" and not c.friction]
+    rubbing = [c for c in cells if c.controller in TDE_LAWS and c.friction]
+    text = "TDE-STC's torques are Table V's, friction-free: largest relative difference"
+    yield text, [abs((c.ratio or 0.0) - 1.0) for c in free if c.column in TORQUE], "<=", 0.01
+    text = "The TDE laws track closer than printed in every cell: largest measured / printed"
+    yield text, [c.ratio or 0.0 for c in rubbing if c.column in TRACKING], "<=", 1.0
+    variation = {
+        (r.row.controller, r.variant.gains): r.chatter["variation"]["base_torque"]
+        for r in results
+        if r.chatter
+    }
+    own = variation.get(("tde_stc", "printed"))
+    for law, (text, factor) in SMOOTHNESS.items():
+        yield text, [variation[law] / own] if own and law in variation else [], ">=", factor
+    for words, flown in (("with friction", rubbing), ("friction-free", free)):
+        errors = {(c.case, c.column): c.measured for c in flown if c.controller == "tde_stc"}
+        for case in ("4-1", "4-2"):
+            pairs = [(errors.get((case, name)), errors.get(("1", name))) for name in TRACKING]
+            growth = [heavy / light for heavy, light in pairs if heavy and light]
+            text = "Payload and disturbance hardly degrade TDE-STC, no error doubles, "
+            yield f"{text}{words}: case {case} / 1", growth, "<=", 2.0
 
 
 def check_results_folder(folder: Path) -> None:
@@ -67,19 +233,18 @@ def reproduce(
     jobs: int,
     progress: Callable[[int], Callable[[], None]] = lambda total: lambda: None,
 ) -> dict[str, Any]:
-    """Fly ``rows`` and write table, figures and report into ``folder``.
+    """Fly ``rows``, write table, figures and report into ``folder``, and return the JSON's content.
+
+    The folder is written atomically at the end; an older reproduction is replaced.
 
     Args:
         rows: of Table V.
-        folder: written atomically at the end; an older reproduction is replaced.
+        folder: of the results.
         duration: of the flights, s (None: 30 s, as in Table V).
         brief: fly only what Table V needs, see `plan`; figures as SVG only.
         equipment: sensors, navigation and actuators; Table V assumes ideal ones.
         jobs: number of processes.
         progress: called with the number of flights; returns a function to call after each one.
-
-    Returns:
-        The content of the JSON file.
 
     Raises:
         InputError: the folder contains other files, or the base has no attitude actuators.
@@ -97,7 +262,7 @@ def reproduce(
         figures.path.mkdir(parents=True)
         planned = list(plan(rows, brief))
         order = sorted(planned, key=lambda flight: flight[0].shown != flight[1])  # longest first
-        fly_one = partial(_fly, duration=duration, figures=figures, equipment=equipment)
+        fly_one = partial(fly, duration=duration, figures=figures, equipment=equipment)
         flown = dict(zip(order, run_all(fly_one, order, jobs, progress), strict=True))
         results = [flown[flight] for flight in planned]
         if torques := {r.row.controller: r.base_torque for r in results if r.base_torque}:
@@ -120,34 +285,30 @@ def reproduce(
     return record
 
 
-def _fly(
-    flight: tuple[TableRow, Variant],
-    duration: float | None,
-    figures: FigureFolder,
-    equipment: Equipment,
-) -> Result:
-    return fly(*flight, duration, figures, equipment)
-
-
 def _write(
     rows: Sequence[TableRow],
     results: Sequence[Result],
     provenance: dict[str, Any],
     figures: FigureFolder,
 ) -> dict[str, Any]:
-    folder, comparison, chattering = figures.path.parent, cells(results), chatter(results)
-    tables = [*variant_tables(comparison), chatter_table(chattering)]
+    folder, comparison = figures.path.parent, compare_with_table(results)
+    judged = judge_claims(results, comparison)
     record: dict[str, Any] = {
         "provenance": provenance,
-        "claims": [claim.as_record() for claim in claims(results, comparison)],
+        "claims": [{**claim._asdict(), "holds": claim.holds} for claim in judged],
         "cells": [cell._asdict() for cell in comparison],
-        "chatter": chattering,
+        "chatter": [
+            {"controller": r.row.controller, "gains": r.variant.gains, **r.chatter}
+            for r in results
+            if r.chatter
+        ],
         "parameters": {
             f"{r.row.controller}, case {r.row.case}, {r.variant.gains} gains": r.parameters
             for r in results
             if r.variant.friction
         },
     }
+    tables = [*variant_tables(comparison), chatter_table(record["chatter"])]
     title = "Table V: measured / printed (ratio)"
     (folder / f"{TABLE}.md").write_text(as_markdown(title, tables), "utf-8")
     with csv_writer(folder / f"{TABLE}.csv") as writer:

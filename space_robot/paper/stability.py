@@ -118,21 +118,18 @@ def flown_inertia(robot: Robot, log: FlightLog, ticks: NDArray[np.intp]) -> Arra
 
 
 def contraction(robot: Robot, h_bar: Array, log: FlightLog) -> Contraction:
-    """Return norm and radius of W along ``log``.
+    """Return norm and radius of W along a flight, with the diagonal (m,) of h_bar.
 
-    Args:
-        robot: the robot that flew, with its payload.
-        h_bar: (m,) diagonal of h_bar.
-        log: the flight, evaluated every `LEMMA_1_EVERY_S` seconds.
+    The ``robot`` is the one that flew, with its payload.
     """
     period = log.timebase.period
     ticks = np.arange(0, log.ticks, max(1, round(LEMMA_1_EVERY_S / period)))
     w = contraction_matrix(flown_inertia(robot, log, ticks), h_bar)
 
     def extremes(values: Array) -> Extremes:
-        high, low = int(np.argmax(values)), int(np.argmin(values))
-        times = (ticks[[high, low]] * period).tolist()
-        return Extremes(float(values[high]), times[0], float(values[low]), times[1])
+        places = [int(np.argmax(values)), int(np.argmin(values))]
+        pairs = np.column_stack([values[places], ticks[places] * period])
+        return Extremes(*pairs.ravel().tolist())
 
     radius = np.max(np.abs(np.linalg.eigvals(w)), axis=1)
     return Contraction(extremes(np.linalg.norm(w, 2, axis=(1, 2))), extremes(radius))
@@ -214,25 +211,19 @@ def lyapunov_state(s: Array, k_1: Array, period: float) -> Array:
 
 def arrival(s: Array, threshold: Array, period: float) -> Array:
     """Return the time (m,), s, from which |s| stays below ``threshold`` for `DWELL`; or NaN."""
-    ticks = max(1, round(DWELL / period))
-    times = np.full(s.shape[1], np.nan)
-    for axis in range(s.shape[1]):
-        outside = np.flatnonzero(np.abs(s[:, axis]) > threshold[axis])
-        begins = np.concatenate([[0], outside + 1])
-        ends = np.concatenate([outside, [len(s)]])
-        long_enough = np.flatnonzero(ends - begins >= ticks)
+    ticks, times = max(1, round(DWELL / period)), np.full(s.shape[1], np.nan)
+    for axis, is_outside in enumerate((np.abs(s) > threshold).T):
+        edges = np.concatenate([[-1], np.flatnonzero(is_outside), [len(s)]])
+        long_enough = np.flatnonzero(np.diff(edges) > ticks)
         if len(long_enough):
-            times[axis] = begins[long_enough[0]] * period
+            times[axis] = (edges[long_enough[0]] + 1) * period
     return times
 
 
 def reaching(log: FlightLog, k_1: Array, undisturbed: Array) -> Reaching:
-    """Measure when a flight from an initial error reaches the sliding surface.
+    """Measure when a flight with K_1 (m,) from an initial error reaches the sliding surface.
 
-    Args:
-        log: the flight, with telemetry.
-        k_1: (m,) K_1 of its law.
-        undisturbed: (m,) `ripple` of the flight without an initial error.
+    ``undisturbed`` (m,) is the `ripple` of the flight without an initial error.
     """
     assert log.telemetry is not None
     s, period = log.telemetry[:, 0], log.timebase.period
@@ -336,10 +327,8 @@ class StabilityStudy:
 def study(plan: Scenario, initial_error: float, fly: Fly) -> StabilityStudy:
     """Fly the flights of the study and check every condition of the paper.
 
-    Args:
-        plan: the flight; a second one is without friction.
-        initial_error: e on every axis (eps: dimensionless, joints: rad) at the start of a third.
-        fly: function that flies them.
+    They are ``plan``, the same without friction, and from ``initial_error``, e on every axis
+    (eps: dimensionless, joints: rad).
 
     Raises:
         InputError: the plan's law has no time-delay estimation, or the flight is too short.
@@ -362,11 +351,10 @@ def study(plan: Scenario, initial_error: float, fly: Fly) -> StabilityStudy:
     if log.telemetry is not None and {"k_1", "k_2"} <= gains.keys():
         off = fly(Flight(resolve(off_mission_plan(flight, initial_error))), "from an initial error")
         reached = reaching(off, gains["k_1"], ripple(log.telemetry[:, 0]))
-        bounds = error.beta.tolist(), derivative(off).beta.tolist()
-        columns = gains["k_1"].tolist(), gains["k_2"].tolist(), *bounds
+        columns = np.stack([gains["k_1"], gains["k_2"], error.beta, derivative(off).beta], axis=1)
         axes = [
             axis_conditions(k_1, k_2, beta, reaching_beta, reached, axis)
-            for axis, (k_1, k_2, beta, reaching_beta) in enumerate(zip(*columns, strict=True))
+            for axis, (k_1, k_2, beta, reaching_beta) in enumerate(columns.tolist())
         ]
         twisting = SuperTwisting(initial_error, reached, axes)
     lemma_1 = contraction(flight.plant.robot, h_bar, log)

@@ -14,7 +14,14 @@ from ..console.tables import Column, JudgedCell, Table, Value
 from ..console.terminal import say
 from ..console.terminal_tables import print_table
 from .lyapunov import Certificate
-from .stability import LEMMA_1_EVERY_S, Check, ErrorDerivative, StabilityStudy, SuperTwisting
+from .stability import (
+    LEMMA_1_EVERY_S,
+    AxisConditions,
+    Check,
+    ErrorDerivative,
+    StabilityStudy,
+    SuperTwisting,
+)
 
 TONES = {"holds": "good", "fails": "bad", "open": "open", "not applicable": "open"}
 
@@ -42,28 +49,25 @@ def report(study: StabilityStudy) -> dict[str, Any]:
 
 
 def _super_twisting(twisting: SuperTwisting) -> dict[str, Any]:
-    axes = twisting.axes
+    columns = dict(zip(AxisConditions._fields, zip(*twisting.axes, strict=True), strict=True))
     return {
-        "k_1": [axis.k_1 for axis in axes],
-        "k_2": [axis.k_2 for axis in axes],
-        "beta": [axis.beta for axis in axes],
-        "tolerated_beta": [axis.tolerated_beta for axis in axes],
-        "beta_below_k_2": [axis.beta_below_k_2 for axis in axes],
-        "4_k_2_below_k_1_squared": [axis.four_k_2_below_k_1_squared for axis in axes],
-        "circle_criterion": [axis.circle_criterion for axis in axes],
+        **{name: columns[name] for name in ("k_1", "k_2", "beta", "tolerated_beta")},
+        "beta_below_k_2": columns["beta_below_k_2"],
+        "4_k_2_below_k_1_squared": columns["four_k_2_below_k_1_squared"],
+        "circle_criterion": columns["circle_criterion"],
         "lmi": {
-            "residual_of_paper_m_at_beta_0_gamma_0": [axis.paper_m_residual for axis in axes],
-            "paper_m_eigenvalues": [axis.paper_m_eigenvalues for axis in axes],
-            "measured_beta": [axis.measured for axis in axes],
-            "assumed_beta_half_of_tolerated": [axis.assumed for axis in axes],
+            "residual_of_paper_m_at_beta_0_gamma_0": columns["paper_m_residual"],
+            "paper_m_eigenvalues": columns["paper_m_eigenvalues"],
+            "measured_beta": columns["measured"],
+            "assumed_beta_half_of_tolerated": columns["assumed"],
         },
         "reaching": {
             "initial_error": twisting.initial_error,
-            "initial_lyapunov_value": [axis.initial_value for axis in axes],
+            "initial_lyapunov_value": columns["initial_value"],
             "threshold_of_s": twisting.reaching.threshold,
-            "beta_of_bound": [axis.certificate and axis.certificate.beta for axis in axes],
-            "beta_of_this_flight": [axis.reaching_beta for axis in axes],
-            "reaching_time_s_below_bound": [axis.reaching_time for axis in axes],
+            "beta_of_bound": [x.certificate and x.certificate.beta for x in twisting.axes],
+            "beta_of_this_flight": columns["reaching_beta"],
+            "reaching_time_s_below_bound": columns["reaching_time"],
         },
     }
 
@@ -123,17 +127,11 @@ def _lemma_1(study: StabilityStudy) -> Table:
         "spectral radius": study.lemma_1.radius,
     }
     rows = [
-        [
-            name,
-            f"{extremes.min:.4f}",
-            f"{extremes.max:.4f}",
-            f"{extremes.max_at_s:.2f}",
-            _verdict(f"{extremes.max:.4f} < 1", extremes.below_one),
-        ]
-        for name, extremes in norms.items()
+        [name, x.min, x.max, x.max_at_s, _verdict(f"{x.max:.4f} < 1", x.below_one)]
+        for name, x in norms.items()
     ]
-    heads = ("", "min", "max", "at t (s)", "below 1")
-    columns = [Column(head, is_label=not head) for head in heads]
+    heads = {"min": ".4f", "max": ".4f", "at t (s)": ".2f", "below 1": ""}
+    columns = [Column(is_label=True), *(Column(head, "", spec) for head, spec in heads.items())]
     return Table.of("Lemma 1: W = E - H_S^-1 H̄ (69)", columns, rows)
 
 

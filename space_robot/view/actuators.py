@@ -6,8 +6,7 @@ they can be seen, each on its axis through the base's centre of mass.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,16 +17,13 @@ from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.errors import InputError
 
 from ..analysis.described import flown_actuators
-from .extent import BaseSurface
-from .frames import frame_rows
-from .glb import revolved_glb
+from .frames import Move, frame_rows
+from .meshes import cone, revolved_glb, wheel
 from .scene import rgb, set_pose, turns_from_z
-from .shapes import cone, wheel
+from .shapes import BaseSurface
 
 if TYPE_CHECKING:
     from viser import GlbHandle, MeshHandle, SceneApi
-
-    from .scene import RobotScene
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -47,10 +43,9 @@ LENGTH = 0.7
 """Length of the plume of the strongest thruster, open all the time, relative to the base's size."""
 THICK, THIN = 0.024, 0.085
 """Radius of a plume at the nozzle and at its end, relative to the same."""
-NOZZLE = (0.012, 0.03, 0.07)
-"""Radii of throat and exit of a nozzle, and its length, relative to the same."""
-STRUT = 0.008
-"""Radius of the strut that holds a nozzle beside the base, relative to the same."""
+NOZZLE, STRUT = (0.012, 0.03, 0.07), 0.008
+"""Radii of throat and exit of a nozzle, and its length, relative to the same; radius of the strut
+that holds it off the base."""
 SHORTEST = 2.0**-7
 """Resolution of a plume's length, relative to the longest; shorter ones are not drawn."""
 SIDES, RINGS = 12, 5
@@ -73,56 +68,46 @@ class ActuatorFrames(NamedTuple):
 
     @classmethod
     def of(cls, log: FlightLog, flown: BaseActuatorSettings, times: Array) -> ActuatorFrames:
-        """Integrate the wheels' speeds, and average the thrusts, means over the ticks' intervals.
+        """Integrate the wheels' speeds, and average the thrusts, to ``times`` (K,), s.
 
-        Args:
-            log: the flight.
-            flown: actuators of its base.
-            times: (K,) of the frames, s.
+        Speeds and thrusts are means over the ticks' intervals.
         """
-        rows, zero = frame_rows(log, times), np.zeros((1, flown.wheel_count))
+        rows = frame_rows(log, times)
         speeds = np.zeros((log.ticks, flown.wheel_count))
         for number, column in enumerate(log.wheel_velocities.T):
             if (known := np.isfinite(column)).any():
                 speeds[:, number] = np.interp(log.time, log.time[known], column[known])
-        steps = 0.5 * log.timebase.period * (speeds[1:] + speeds[:-1])
-        turned = np.concatenate([zero, np.cumsum(steps, axis=0)])
+        turned = _sums(0.5 * log.timebase.period * (speeds[1:] + speeds[:-1]))[rows]
         longest = float(np.diff(times).max(initial=0.0))
-        slowdown = slowdown_of(float(np.abs(speeds).max(initial=0.0)), longest)
+        slowdown = wheel_slowdown(float(np.abs(speeds).max(initial=0.0)), longest)
         starts = np.minimum(np.concatenate([rows[:1], rows[:-1] + 1]), rows)
         counts = (rows + 1 - starts)[:, np.newaxis]
-        limited = at_limit(flown.wheels, log.wheel_velocities, log.wheel_torques)
-        limited_before = np.concatenate([zero, np.cumsum(limited, axis=0)])
-        thrust_before = np.zeros((log.ticks + 1, log.thrusts.shape[1]))
-        np.cumsum(np.nan_to_num(log.thrusts), axis=0, out=thrust_before[1:])
+        limited = _sums(_at_limit(flown.wheels, log.wheel_velocities, log.wheel_torques))
+        thrusts = _sums(np.nan_to_num(log.thrusts))
         return cls(
-            turned[rows] / slowdown,
-            limited_before[rows + 1] > limited_before[starts],
-            (thrust_before[rows + 1] - thrust_before[starts]) / counts,
+            turned / slowdown,
+            limited[rows + 1] > limited[starts],
+            (thrusts[rows + 1] - thrusts[starts]) / counts,
             slowdown,
         )
 
 
-def slowdown_of(speed: float, frame_s: float = 0.0) -> float:
-    """Return how many times slower wheels of a speed, rad/s, are drawn: 1, 2 or 5 times 10^k.
+def _sums(values: Array | Mask) -> Array:
+    """Return the sums of the first 0, 1, ... N rows of (N, C) values."""
+    return np.concatenate([np.zeros((1, values.shape[1])), np.cumsum(values, axis=0)])
 
-    Args:
-        speed: largest one.
-        frame_s: time from one frame to the next, s.
+
+def wheel_slowdown(speed: float, frame_s: float = 0.0) -> float:
+    """Return how many times slower wheels are drawn: 1, 2 or 5 times 10^k.
+
+    Their largest ``speed`` is in rad/s, the time from one frame to the next in s.
     """
     least = max(speed / FASTEST, speed * frame_s / LARGEST_TURN, 1.0)
     decade = 10.0 ** np.floor(np.log10(least))
     return float(next(step for step in decade * np.array([1, 2, 5, 10]) if step >= least))
 
 
-def at_limit(wheels: WheelSettings, speeds: Array, torques: Array) -> Mask:
-    """Return whether wheels are at a limit, (..., W).
-
-    Args:
-        wheels: with their limits.
-        speeds: (..., W) rad/s.
-        torques: (..., W) of their motors, N m.
-    """
+def _at_limit(wheels: WheelSettings, speeds: Array, torques: Array) -> Mask:
     # the comparison with NaN is false
     return np.asarray(
         (np.abs(wheels.spin_momenta(speeds)) >= AT_LIMIT * wheels.limits("max_momentum"))
@@ -130,100 +115,76 @@ def at_limit(wheels: WheelSettings, speeds: Array, torques: Array) -> Mask:
     )
 
 
-class DrawnActuators:
-    """Wheels and thrusters on a robot's base."""
+def add_actuators(
+    scene: SceneApi, base: str, robot: Robot, log: FlightLog, times: Array, dark: bool
+) -> list[Move]:
+    """Draw wheels and thrusters on a robot's base; return what moves them.
 
-    def __init__(
-        self,
-        scene: SceneApi,
-        robot_scene: RobotScene,
-        robot: Robot,
-        flown: BaseActuatorSettings,
-        dark: bool,
-    ) -> None:
-        """Draw wheels, nozzles, and plumes of no length.
+    ``base`` is the name of the base in the scene, ``times`` (K,), s, are those of the frames.
+    """
+    flown, moves = described_actuators(log), list[Move]()
+    if not (flown.wheel_count or flown.thruster_count):
+        return moves
+    frames, surface = ActuatorFrames.of(log, flown, times), BaseSurface(robot)
+    size = surface.size
+    if flown.wheel_count:
+        axes, mesh = flown.wheels.unit_axes, wheel(RADIUS * size, WIDTH * size)
+        places = wheel_places(surface, robot.com[0], axes)
+        for number, turn in enumerate(turns_from_z(axes)):
+            path = f"{base}/wheel_{number + 1}"
+            scene.add_frame(path, show_axes=False, position=places[number], wxyz=turn)
+            rotor = scene.add_mesh_simple(
+                f"{path}/rotor", *mesh, color=rgb(COLOUR), flat_shading=True
+            )
+            moves.append(_turning(rotor, frames.angles[:, number], frames.is_saturated[:, number]))
+    if flown.thruster_count:
+        throat, opening, length = (share * size for share in NOZZLE)
+        nozzle, plume = cone(throat, opening, length), plume_glb(size, dark)
+        places = robot.com[0] + flown.thrusters.places
+        unlit: Any = {"cast_shadow": False, "receive_shadow": False, "visible": False}
+        step = SHORTEST * float(flown.thrusters.values("force").max())
+        for number, turn in enumerate(turns_from_z(-flown.thrusters.unit_directions)):
+            path, place = f"{base}/thruster_{number + 1}", places[number]
+            _add_strut(scene, f"{path}_strut", surface.nearest(place), place, size)
+            scene.add_frame(path, show_axes=False, position=place, wxyz=turn)
+            scene.add_mesh_simple(f"{path}/nozzle", *nozzle, color=METAL, flat_shading=False)
+            light = scene.add_glb(f"{path}/plume", plume, position=(0.0, 0.0, length), **unlit)
+            moves.append(_shining(light, np.round(frames.thrusts[:, number] / step) * SHORTEST))
+    return moves
 
-        Args:
-            scene: of a server.
-            robot_scene: the robot in it.
-            robot: that carries them.
-            flown: of its base.
-            dark: whether the page is light on dark.
-        """
-        self._scene, self._root = scene, robot_scene.base.name
-        surface = BaseSurface(robot)
-        self._size = surface.size
-        self._rotors: list[MeshHandle] = []
-        self._is_red = [False] * flown.wheel_count
-        self._plumes: list[GlbHandle] = []
-        self._lengths = [0.0] * flown.thruster_count
-        self._largest = 1.0
-        if flown.wheel_count:
-            axes = flown.wheels.unit_axes
-            mesh = wheel(RADIUS * self._size, WIDTH * self._size)
-            places = wheel_places(surface, robot.com[0], axes)
-            for number, turn in enumerate(turns_from_z(axes)):
-                path = f"{self._root}/wheel_{number + 1}"
-                scene.add_frame(path, show_axes=False, position=places[number], wxyz=turn)
-                rotor = scene.add_mesh_simple(
-                    f"{path}/rotor", *mesh, color=rgb(COLOUR), flat_shading=True
-                )
-                self._rotors.append(rotor)
-        if flown.thruster_count:
-            thrusters, plume = flown.thrusters, plume_glb(self._size, dark)
-            self._largest = float(thrusters.values("force").max())
-            places = robot.com[0] + thrusters.places
-            for number, away in enumerate(turns_from_z(-thrusters.unit_directions)):
-                path, place = f"{self._root}/thruster_{number + 1}", places[number]
-                self._add_strut(f"{path}_strut", surface.nearest(place), place)
-                self._add_thruster(path, place, away, plume)
 
-    def _add_thruster(self, path: str, place: Array, turn: Array, plume: bytes) -> None:
-        throat, opening, length = (share * self._size for share in NOZZLE)
-        nozzle = cone(throat, opening, length)
-        self._scene.add_frame(path, show_axes=False, position=place, wxyz=turn)
-        self._scene.add_mesh_simple(f"{path}/nozzle", *nozzle, color=METAL, flat_shading=False)
-        handle = self._scene.add_glb(
-            f"{path}/plume",
-            plume,
-            position=(0.0, 0.0, length),
-            cast_shadow=False,
-            receive_shadow=False,
-            visible=False,
-        )
-        self._plumes.append(handle)
+def _add_strut(scene: SceneApi, path: str, start: Array, end: Array, size: float) -> None:
+    """Draw what holds a nozzle that is away from the base."""
+    along = end - start
+    length = float(np.linalg.norm(along))
+    if length > NOZZLE[1] * size:
+        mesh = cone(STRUT * size, STRUT * size, length)
+        turn = turns_from_z(along[np.newaxis] / length)[0]
+        scene.add_mesh_simple(path, *mesh, color=METAL, position=start, wxyz=turn)
 
-    def _add_strut(self, path: str, start: Array, end: Array) -> None:
-        """Draw what holds a nozzle that is away from the base."""
-        along = end - start
-        length = float(np.linalg.norm(along))
-        if length > NOZZLE[1] * self._size:
-            mesh = cone(STRUT * self._size, STRUT * self._size, length)
-            turn = turns_from_z(along[np.newaxis] / length)[0]
-            self._scene.add_mesh_simple(path, *mesh, color=METAL, position=start, wxyz=turn)
 
-    def move(self, angles: Array, is_saturated: Sequence[bool] | Mask, thrusts: Array) -> None:
-        """Turn the wheels, and set the lengths of the plumes in proportion to the thrusts.
+def _turning(rotor: MeshHandle, angles: Array, is_saturated: Mask) -> Move:
+    turns = np.zeros((len(angles), 4))
+    turns[:, 0], turns[:, 3] = np.cos(0.5 * angles), np.sin(0.5 * angles)
+    turns = np.round(turns / STEP) * STEP
 
-        Args:
-            angles: (W,) rad.
-            is_saturated: (W,) which wheels are drawn in another colour.
-            thrusts: (T,) N.
-        """
-        for number, rotor in enumerate(self._rotors):
-            half = 0.5 * float(angles[number])
-            turn = np.array([np.cos(half), 0.0, 0.0, np.sin(half)])
-            set_pose(rotor, "wxyz", np.round(turn / STEP) * STEP)
-            if (red := bool(is_saturated[number])) != self._is_red[number]:
-                self._is_red[number] = red
-                rotor.color = rgb(SATURATED if red else COLOUR)
-        shares = np.round(thrusts / (self._largest * SHORTEST)) * SHORTEST
-        for number, (plume, share) in enumerate(zip(self._plumes, shares.tolist(), strict=True)):
-            before, self._lengths[number] = self._lengths[number], share
-            if share not in (before, 0.0):
-                plume.scale = (1.0, 1.0, share)
-            if (share > 0.0) != (before > 0.0):
-                plume.visible = share > 0.0
+    def move(k: int) -> None:
+        set_pose(rotor, "wxyz", turns[k])
+        if is_saturated[k] != (k > 0 and is_saturated[k - 1]):
+            rotor.color = rgb(SATURATED if is_saturated[k] else COLOUR)
+
+    return move
+
+
+def _shining(plume: GlbHandle, lengths: Array) -> Move:
+    def move(k: int) -> None:
+        length, before = float(lengths[k]), float(lengths[k - 1]) if k else 0.0
+        if length not in (before, 0.0):
+            plume.scale = (1.0, 1.0, length)
+        if (length > 0.0) != (before > 0.0):
+            plume.visible = length > 0.0
+
+    return move
 
 
 def wheel_places(surface: BaseSurface, com: Array, axes: Array) -> Array:
@@ -240,22 +201,18 @@ def wheel_places(surface: BaseSurface, com: Array, axes: Array) -> Array:
 
 
 def plume_glb(size: float, dark: bool) -> bytes:
-    """Return a plume along z as a GLB file: its light fades with the distance.
-
-    Args:
-        size: of the base, m.
-        dark: whether the page is light on dark.
-    """
+    """Return a plume along z as a GLB file, for a base of a size, m: its light fades outwards."""
     along = np.linspace(0.0, 1.0, RINGS)
     radii = size * (THICK + (THIN - THICK) * along)
     colours = np.column_stack([np.tile(GLOW[dark], (RINGS, 1)), 0.95 * (1.0 - along)])
     return revolved_glb(radii, size * LENGTH * along, colours, SIDES)
 
 
-def actuator_notes(flown: BaseActuatorSettings, slowdown: float) -> list[str]:
-    """Say how actuators are drawn whose wheels turn so many times slower, a sentence each."""
-    notes = []
+def actuator_notes(log: FlightLog, times: Array) -> list[str]:
+    """Say how actuators are drawn in frames at ``times`` (K,), s, a sentence each."""
+    flown, notes = described_actuators(log), []
     if flown.wheel_count:
+        slowdown = ActuatorFrames.of(log, flown, times).slowdown
         speed = "as fast as" if slowdown == 1.0 else f"{slowdown:g} times slower than"
         notes.append(f"Wheels turn {speed} in flight; red: at a limit of torque or momentum.")
     if flown.thruster_count:

@@ -15,14 +15,13 @@ from space_robot_msgs_py.bag.flight_log import FlightLog
 
 from ..analysis.tool_path import Poses, wanted_poses
 from ..analysis.waypoints import waypoint_ticks
-from .actuators import ActuatorFrames, DrawnActuators, described_actuators
-from .earth import Earth
-from .extent import extent
+from .actuators import add_actuators
 from .frames import Frames, Move
-from .orbit import OrbitArrows, OrbitFrames
-from .scene import RobotScene, SceneStyle, local_server, rgb
-from .stage import Horizon, Stage, clearest_side, set_stage
-from .targets import targets
+from .orbit import OrbitArrows, OrbitFrames, add_earth
+from .scene import PLAIN, RGB, RobotScene, SceneStyle, local_server, rgb
+from .shapes import extent
+from .stage import clearest_side, set_stage
+from .targets import add_targets
 
 if TYPE_CHECKING:
     from viser import LineSegmentsHandle, SceneApi, ViserServer
@@ -59,14 +58,10 @@ def animate(
     dark: bool,
     advance: Callable[[int], Callable[[], None]],
 ) -> str:
-    """Return the page of an animated scene of flights.
+    """Return the page of an animated scene of flights with frames at ``times`` (K,), s.
 
-    Args:
-        flights: to be shown.
-        times: (K,) of the frames, s.
-        side_by_side: whether the robots are side by side instead of overlapping.
-        dark: whether the page is light on dark.
-        advance: called with the number of frames, then after each frame.
+    The robots are side by side or overlap. ``advance`` is called with the number of frames; what
+    it returns after each frame.
 
     Raises:
         InputError: viser is not installed, or a flight has no state.
@@ -95,32 +90,25 @@ class _SampledFlight:
         self.poses = self.frames.base_quaternion[rows], self.frames.joint_positions[rows]
         self.points = extent(robot, self.frames.base_position[rows], *self.poses)
         """(K, 3) m, what the camera must see of the robot."""
+        self.size = float(np.ptp(self.points, axis=0).max())
         self.place = np.zeros(3)
         """(3,) m, of its frame in the scene."""
         self.orbit = OrbitFrames.of(log, times)
         self.arrows: OrbitArrows | None = None
 
-    def add_arrows(self) -> None:
-        """Let it have arrows, if it is in orbit."""
-        if self.orbit:
-            self.arrows = OrbitArrows(self.flight.robot, self.frames, self.orbit, self.points)
-
-    def draw(self, scene: SceneApi, look: SceneStyle, dark: bool) -> list[Move]:
+    def draw(self, scene: SceneApi, style: SceneStyle, dark: bool) -> list[Move]:
         """Draw the robot and what belongs to it; return what moves them."""
-        flight, frames = self.flight, self.frames
+        flight, frames, times = self.flight, self.frames, self._times
         log, root = flight.log, f"/{flight.name.replace('/', '_')}"
         scene.add_frame(root, show_axes=False, position=self.place)
-        size = float(np.ptp(self.points, axis=0).max())
-        robot = RobotScene(scene, root, flight.robot, look)
-        moves = [_robot(robot, frames)]
-        moves += trails(scene, root, frames, rgb(flight.colour), 0.0035 * size)
+        robot = RobotScene(scene, root, flight.robot, style)
+        position, quaternion = frames.base_position, frames.base_quaternion
+        moves: list[Move] = [lambda k: robot.move(position[k], quaternion[k], frames.joints, k)]
+        moves += trails(scene, root, frames, rgb(flight.colour), 0.0035 * self.size)
         if self._wanted is not None:
-            _goals(scene, root, log, self._wanted, 0.04 * size)
-        flown = described_actuators(log)
-        if flown.wheel_count or flown.thruster_count:
-            drawn = DrawnActuators(scene, robot, flight.robot, flown, dark)
-            moves.append(_actuators(drawn, ActuatorFrames.of(log, flown, self._times)))
-        moves += targets(scene, root, robot, log, flight.robot, self._times)
+            _add_goals(scene, root, log, self._wanted, 0.04 * self.size)
+        moves += add_actuators(scene, robot.base.name, flight.robot, log, times, dark)
+        moves += add_targets(scene, root, robot, log, flight.robot, times)
         if self.arrows:
             moves.append(self.arrows.add(scene, root, dark))
         return moves
@@ -132,22 +120,28 @@ def _draw(
     """Draw flights in an empty scene; return what moves everything to a frame."""
     in_orbit = [flight for flight in flights if flight.orbit]
     orbit = in_orbit[0].orbit if in_orbit else None
-    horizon = Horizon.of(orbit) if orbit else None
     if side_by_side:
-        _place(flights, horizon.axes[:, 0] if horizon else np.array([1.0, 0.0, 0.0]))
+        _place(flights, orbit.axes[:, 0] if orbit else np.array([1.0, 0.0, 0.0]))
     for flight in in_orbit if side_by_side else in_orbit[:1]:
-        flight.add_arrows()
+        assert flight.orbit
+        robot = flight.flight.robot
+        flight.arrows = OrbitArrows(robot, flight.frames, flight.orbit, flight.points)
     points = [flight.place + flight.points for flight in flights]
     points += [flight.place + flight.arrows.tips for flight in flights if flight.arrows]
-    side = clearest_side([(flight.flight.robot, *flight.poses) for flight in flights], horizon)
-    stage = set_stage(server, np.concatenate(points), dark, horizon, side)
-    moves = [_earth(server.scene, stage, orbit, dark)] if orbit else []
+    side = clearest_side([(flight.flight.robot, *flight.poses) for flight in flights], orbit)
+    stage = set_stage(server, np.concatenate(points), dark, orbit, side)
+    moves: list[Move] = []
+    if orbit:
+        is_dark = orbit.is_dark
+        moves = [
+            add_earth(server.scene, orbit, stage.middle, stage.earth_distance, dark),
+            lambda k: stage.shade(bool(is_dark[k])),
+        ]
     for index, flight in enumerate(flights):
-        look = SceneStyle()
+        style = PLAIN
         if index and not side_by_side:
-            growth = 0.004 * float(np.ptp(flight.points, axis=0).max()) * index
-            look = SceneStyle(flight.flight.colour, GHOST, growth)
-        moves += flight.draw(server.scene, look, dark)
+            style = SceneStyle(flight.flight.colour, GHOST, 0.004 * flight.size * index)
+        moves += flight.draw(server.scene, style, dark)
     return moves
 
 
@@ -160,44 +154,17 @@ def _place(flights: Sequence[_SampledFlight], across: Array) -> None:
         flight.place = (end + GAP * width - float(along.min())) * across
 
 
-def _earth(scene: SceneApi, stage: Stage, orbit: OrbitFrames, dark: bool) -> Move:
-    """Draw the Earth; return what moves it, and dims the Sun's light in its shadow."""
-    earth = Earth(scene, orbit, stage.middle, stage.earth_distance, dark)
-
-    def move(k: int) -> None:
-        earth.move(orbit.position[k])
-        stage.shade(bool(orbit.is_dark[k]))
-
-    return move
-
-
-def _robot(robot: RobotScene, frames: Frames) -> Move:
-    return lambda k: robot.move(
-        frames.base_position[k], frames.base_quaternion[k], frames.joints, k
-    )
-
-
-def _actuators(drawn: DrawnActuators, motion: ActuatorFrames) -> Move:
-    return lambda k: drawn.move(motion.angles[k], motion.is_saturated[k], motion.thrusts[k])
-
-
-def trails(
-    scene: SceneApi, root: str, frames: Frames, colour: tuple[int, int, int], width: float
-) -> list[Move]:
+def trails(scene: SceneApi, root: str, frames: Frames, colour: RGB, width: float) -> list[Move]:
     """Draw the paths of a robot's tools, and, thinner, the desired path of the first tool.
 
-    Args:
-        scene: of a server.
-        root: name of the robot in the scene.
-        frames: of its flight.
-        colour: of the flown paths.
-        width: of the flown paths, m.
+    Their ``width`` is in m; ``root`` is the name of the robot in the scene. Return what lets the
+    flown ones appear piece by piece.
     """
     edges = np.unique(np.linspace(0, len(frames.time) - 1, PIECES + 1).round().astype(int))
-    trails: list[Move] = []
+    moves: list[Move] = []
     for tool, places in frames.tools.items():
         pieces = {
-            int(stop): _line(
+            int(stop): _add_line(
                 scene,
                 f"{root}/trail_{tool.replace('/', '_')}/{start}",
                 places[start : stop + 1],
@@ -207,19 +174,14 @@ def trails(
             )
             for start, stop in pairwise(edges)
         }
-        trails.append(_appearing(pieces))
+        moves.append(_appearing(pieces))
     if frames.desired is not None:
-        _line(scene, f"{root}/desired", frames.desired, DESIRED, 0.3 * width, True)
-    return trails
+        _add_line(scene, f"{root}/desired", frames.desired, DESIRED, 0.3 * width, True)
+    return moves
 
 
-def _line(
-    scene: SceneApi,
-    path: str,
-    places: Array,
-    colour: tuple[int, int, int],
-    width: float,
-    visible: bool,
+def _add_line(
+    scene: SceneApi, path: str, places: Array, colour: RGB, width: float, visible: bool
 ) -> LineSegmentsHandle:
     points = np.stack([places[:-1], places[1:]], axis=1)
     return scene.add_line_segments(path, points, colour, thickness=width, visible=visible)
@@ -233,15 +195,14 @@ def _appearing(pieces: dict[int, LineSegmentsHandle]) -> Move:
     return appear
 
 
-def _goals(scene: SceneApi, root: str, log: FlightLog, wanted: Poses, size: float) -> None:
+def _add_goals(scene: SceneApi, root: str, log: FlightLog, wanted: Poses, size: float) -> None:
     """Draw axes of a size, m, at the first tool's wanted poses where the mission comes to rest."""
-    rows, (orientations, positions) = waypoint_ticks(log)[:MOST_GOALS], wanted
-    for number, row in enumerate(rows):
-        turn = Rotation.from_matrix(orientations[row]).as_quat(scalar_first=True)
+    orientations, positions = wanted
+    for number, row in enumerate(waypoint_ticks(log)[:MOST_GOALS]):
         scene.add_frame(
             f"{root}/goal_{number}",
             axes_length=size,
             axes_radius=0.04 * size,
-            wxyz=turn,
+            wxyz=Rotation.from_matrix(orientations[row]).as_quat(scalar_first=True),
             position=positions[row],
         )

@@ -3,33 +3,44 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from importlib.resources import files
+from itertools import cycle, pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from space_robot.analysis.page import template
 from space_robot_model.robot import Robot
 from space_robot_model.robot.find import find_robot, robot_as_path
 from space_robot_model.robot.parts import Spring
 from space_robot_msgs_py.bag.flight_log import FlightLog
-from space_robot_msgs_py.bag.law_history import as_data, in_words, laws_of
+from space_robot_msgs_py.bag.law_history import LawChange, as_data, in_words, laws_of
+from space_robot_msgs_py.config.text import shortened
 from space_robot_msgs_py.errors import InputError
+from space_robot_sim.environment.events import Capture
+from space_robot_sim.faults.grammar import parse_fault
 
-from ..analysis.described import check_joints, robot_of
-from .actuators import ActuatorFrames, actuator_notes, described_actuators
+from ..analysis.analysed_log import AnalysedLog
+from ..analysis.described import check_joints, events_of, robot_of
+from ..analysis.page import template
+from ..analysis.plotted import PlottedQuantity, quantities_of
+from ..scenario.faults import KINDS
+from .actuators import actuator_notes
 from .animation import ShownFlight, animate
 from .frames import RATE_HZ, shown_times
-from .orbit import ArrowKind, arrow_kinds, is_in_orbit, sun_direction
-from .plots import Mark, Plot, plots_of, shared_marks
+from .orbit import arrow_colours, is_in_orbit, shadow_intervals, sun_direction
 from .scene import palette
 from .shapes import shown_shapes
 
 Array = NDArray[np.float64]
+
+STRETCHES = 400
+"""Time intervals of a flight; minimum and maximum of each are drawn, so that chatter is visible."""
+MOST_LETTERS = 40
+"""Maximum length of a label, in characters."""
 
 
 @dataclass(frozen=True)
@@ -48,54 +59,128 @@ class ViewOptions:
     """Kinds of the plots that are shown first, see `plotted.KINDS`; empty: the usual ones."""
 
 
+class Series(NamedTuple):
+    """A line of a plot, as the page's script has it."""
+
+    label: str
+    colour: str
+    values: Array
+    """(K,) values."""
+    wanted: bool = False
+    """True for desired values."""
+
+
+class Plot(NamedTuple):
+    """A plot over time, as the page's script has it."""
+
+    title: str
+    unit: str
+    series: Sequence[Series]
+    logarithmic: bool = False
+    pulses: bool = False
+    """True if each series has a separate row, for values from 0 to 1."""
+    limits: Sequence[float] = ()
+    """Values at which a line goes across."""
+    kind: str = ""
+    """One of `space_robot.analysis.plotted.KINDS`."""
+    shown: bool = True
+    """True if the page begins with it; a reader can choose others."""
+
+    def as_data(self) -> dict[str, Any]:
+        """Return it for JSON, with values of four digits, None where nothing can be drawn."""
+        series = []
+        for one in self.series:
+            known = np.isfinite(one.values) & ~(self.logarithmic & (one.values <= 0.0))
+            pairs = zip(one.values, known, strict=True)
+            values = [float(f"{value:.4g}") if is_known else None for value, is_known in pairs]
+            series.append({**one._asdict(), "values": values})
+        return {**self._asdict(), "series": series}
+
+
+class Mark(NamedTuple):
+    """A mark on the plots of a flight."""
+
+    start: float
+    """Start, s."""
+    stop: float
+    """End, s: equal to ``start`` for an instant, infinite for a permanent change."""
+    text: str
+    kind: str
+    """``event``, ``fault``, ``law`` or ``shadow``."""
+
+    def as_data(self) -> dict[str, Any]:
+        """Return it for JSON, where no end is None."""
+        return {**self._asdict(), "stop": self.stop if math.isfinite(self.stop) else None}
+
+
 def flights_page(
     logs: Mapping[str, FlightLog],
     robots: Mapping[str, Robot],
     options: ViewOptions,
     advance: Callable[[int], Callable[[], None]],
 ) -> str:
-    """Return the self-contained page of flights.
+    """Return the self-contained page of flights, at least one, and the robots that flew, by name.
 
-    Args:
-        logs: by name, at least one.
-        robots: that flew, by the same names.
-        options: of the page.
-        advance: called with the number of frames, then after each frame.
+    ``advance`` is called with the number of frames; what it returns after each frame.
 
     Raises:
         InputError: viser is not installed, or a flight has no state.
     """
-    colours = palette(options.dark)
+    dark, colours = options.dark, palette(options.dark)
     flights = [
-        ShownFlight(name, log, robots[name], colours[k % len(colours)])
-        for k, (name, log) in enumerate(logs.items())
+        ShownFlight(name, log, robots[name], colour)
+        for (name, log), colour in zip(logs.items(), cycle(colours), strict=False)
     ]
-    is_same_robot = len({(robot.name, robot.body_names) for robot in robots.values()}) == 1
     times = shown_times(list(logs.values()), options.rate)
+    is_same_robot = len({(robot.name, robot.body_names) for robot in robots.values()}) == 1
     side_by_side = options.side_by_side or not is_same_robot
-    scene = animate(flights, times, side_by_side, options.dark, advance)
-    plots = plots_of(logs, robots, colours, options.plots)
-    notes = [note for log in logs.values() for note in _actuator_notes(log, times)]
+    scene = animate(flights, times, side_by_side, dark, advance)
+    time, plots = flight_plots(logs, robots, colours, options.plots)
+    notes = [note for log in logs.values() for note in actuator_notes(log, times)]
     if absent := set(options.plots) - {plot.kind for plot in plots}:
         notes.append(f"Not in the recording: {', '.join(sorted(absent))}.")
+    in_orbit = [log for log in logs.values() if is_in_orbit(log)]
+    has_sun = any(sun_direction(log) is not None for log in in_orbit)
     return render(
         options.title or ", ".join(logs),
-        scene,
-        [PageBag(f.name, f.colour, _description(f), f.log.defects) for f in flights],
+        dark,
+        time,
         plots,
-        shared_marks(logs),
-        float(times[0]),
-        options.dark,
-        _legend(logs, options.dark),
-        list(dict.fromkeys(notes)),
+        scene=scene,
+        flights=[(flight, _description(flight)) for flight in flights],
+        arrows=arrow_colours(has_sun, dark) if in_orbit else {},
+        notes=list(dict.fromkeys(notes)),
+        start=float(times[0]),
+        marks=[mark.as_data() for mark in shared_marks(logs)],
     )
 
 
-def _actuator_notes(log: FlightLog, times: Array) -> list[str]:
-    flown = described_actuators(log)
-    has_any = flown.wheel_count or flown.thruster_count
-    slowdown = ActuatorFrames.of(log, flown, times).slowdown if has_any else 1.0
-    return actuator_notes(flown, slowdown)
+def render(title: str, dark: bool, time: Array, plots: Sequence[Plot], **content: Any) -> str:
+    """Render the self-contained page of plots over ``time``, s, with the template's ``content``."""
+    folder = files(__package__).joinpath("templates")
+    parts = {"uplot": "uPlot.iife.min.js", "uplot_css": "uPlot.min.css"}
+    parts |= {"css": "view.css", "script": "view.js"}
+    data = {
+        "plots": [plot.as_data() for plot in plots],
+        "marks": content.pop("marks"),
+        "time": np.round(time, 4).tolist(),
+        "start": content.pop("start"),
+        "dark": dark,
+    }
+    return template("space_robot.view", "view.html.j2").render(
+        title=title,
+        dark=dark,
+        data=data,
+        **{key: folder.joinpath(name).read_text("utf-8") for key, name in parts.items()},
+        **content,
+    )
+
+
+def _description(flight: ShownFlight) -> str:
+    log = flight.log
+    law = in_words(as_data(laws_of(log), log.timebase)) or str(log.flight.get("controller", ""))
+    case = log.flight.get("case")
+    return ", ".join(filter(None, [law, flight.robot.name, f"case {case}" if case else ""]))
 
 
 def shown_robot(log: FlightLog, name: str = "") -> Robot:
@@ -131,104 +216,108 @@ def remarks_on(logs: Mapping[str, FlightLog], robots: Mapping[str, Robot]) -> li
     return list(dict.fromkeys(lines))
 
 
-def _legend(logs: Mapping[str, FlightLog], dark: bool) -> list[ArrowKind]:
-    """Return the arrows that are shown; none without an orbit."""
-    in_orbit = [log for log in logs.values() if is_in_orbit(log)]
-    has_sun = any(sun_direction(log) is not None for log in in_orbit)
-    return arrow_kinds(has_sun, dark) if in_orbit else []
+def flight_plots(
+    flights: Mapping[str, FlightLog],
+    robots: Mapping[str, Robot],
+    colours: Sequence[str],
+    kinds: Sequence[str] = (),
+) -> tuple[Array, list[Plot]]:
+    """Return the common times, s, and the plots of some flights, ``kinds`` of which come first.
 
-
-def _description(flight: ShownFlight) -> str:
-    log = flight.log
-    law = in_words(as_data(laws_of(log), log.timebase)) or str(log.flight.get("controller", ""))
-    case = log.flight.get("case")
-    return ", ".join(filter(None, [law, flight.robot.name, f"case {case}" if case else ""]))
-
-
-class PageBag(NamedTuple):
-    """A flight on the page."""
-
-    name: str
-    colour: str
-    what: str
-    warnings: Sequence[str] = ()
-    """Defects of its recording, a sentence each."""
-
-
-def render(
-    title: str,
-    scene: str,
-    bags: Sequence[PageBag],
-    plots: Sequence[Plot],
-    marks: Sequence[Mark],
-    start: float,
-    dark: bool,
-    arrows: Sequence[ArrowKind] = (),
-    notes: Sequence[str] = (),
-) -> str:
-    """Render the self-contained page.
-
-    Args:
-        title: of the page.
-        scene: viser's page of the scene.
-        bags: that are shown.
-        plots: in order, with a common time.
-        marks: on the time axis.
-        start: time of the first frame, s.
-        dark: whether the page is light on dark.
-        arrows: at the bases of robots in orbit.
-        notes: on how things are drawn, a sentence each.
+    For one flight each axis is drawn, for several the magnitude of each quantity; the colours are
+    those of the axes, or of the flights. Without ``kinds`` the usual plots are shown.
     """
-    folder = files(__package__).joinpath("templates")
-    data = {
-        "plots": [
-            {
-                "title": plot.title,
-                "unit": plot.unit,
-                "logarithmic": plot.is_logarithmic,
-                "pulses": plot.are_pulses,
-                "shown": plot.is_shown,
-                "limits": list(plot.limits),
-                "series": [
-                    {
-                        "label": s.label,
-                        "colour": s.colour,
-                        "wanted": s.is_wanted,
-                        "values": _digits(s.values, plot.is_logarithmic),
-                    }
-                    for s in plot.series
-                ],
-            }
-            for plot in plots
-        ],
-        "marks": [
-            {
-                "start": m.start,
-                "stop": m.stop if math.isfinite(m.stop) else None,
-                "text": m.text,
-                "kind": m.kind,
-            }
-            for m in marks
-        ],
-        "time": np.round(plots[0].time, 4).tolist() if plots else [],
-        "start": start,
-        "dark": dark,
-    }
-    return template("space_robot.view", "view.html.j2").render(
-        title=title,
-        scene=scene,
-        bags=bags,
-        dark=dark,
-        uplot=folder.joinpath("uPlot.iife.min.js").read_text("utf-8"),
-        uplot_css=folder.joinpath("uPlot.min.css").read_text("utf-8"),
-        css=folder.joinpath("view.css").read_text("utf-8"),
-        arrows=arrows,
-        notes=notes,
-        script=folder.joinpath("view.js").read_text("utf-8"),
-        data=data,
-    )
+    start = min(float(log.time[0]) for log in flights.values())
+    end = max(float(log.time[-1]) for log in flights.values())
+    edges = np.linspace(start, end, STRETCHES + 1, dtype=np.float64)
+    time = np.repeat(edges[:-1], 2)
+    time[1::2] += 0.5 * (edges[1] - edges[0])
+    plots: dict[tuple[str, str], Plot] = {}
+    is_one = len(flights) == 1
+    for (name, log), colour in zip(flights.items(), cycle(colours), strict=False):
+        flight = AnalysedLog(log)
+        flight.robot = robots[name]
+        for kind, quantity in quantities_of(flight):
+            if is_one:
+                series = list(_axis_series(log, quantity, colours, edges))
+            else:
+                label = shortened(name, MOST_LETTERS)
+                series = [Series(label, colour, extremes(log, quantity.size, edges))]
+            key = quantity.title, quantity.unit
+            # of several flights sizes are drawn, which only errors have limits of
+            sides = (1.0,) if quantity.is_error else (-1.0, 1.0) if is_one else ()
+            plot = plots.get(key) or Plot(
+                *key,
+                [],
+                quantity.is_error and not is_one,
+                quantity.are_pulses and is_one,
+                sorted({side * limit for limit in quantity.limits if limit for side in sides}),
+                kind,
+                kind in kinds if kinds else quantity.is_shown,
+            )
+            plots[key] = plot._replace(series=[*plot.series, *series])
+    return time, list(plots.values())
 
 
-def _digits(values: Array, is_logarithmic: bool) -> list[Any]:
-    known = np.isfinite(values) & ~(is_logarithmic & (values <= 0.0))
-    return [float(f"{x:.4g}") if k else None for x, k in zip(values, known, strict=True)]
+def _axis_series(
+    log: FlightLog, quantity: PlottedQuantity, colours: Sequence[str], edges: Array
+) -> Iterator[Series]:
+    for axis, (label, colour) in enumerate(zip(quantity.labels, cycle(colours), strict=False)):
+        text = shortened(label, MOST_LETTERS)
+        yield Series(text, colour, extremes(log, quantity.values[:, axis], edges))
+        if quantity.wanted is not None:
+            wanted = extremes(log, quantity.wanted[:, axis], edges)
+            yield Series(f"{text}, desired", colour, wanted, True)
+
+
+def extremes(log: FlightLog, values: Array, edges: Array) -> Array:
+    """Return minimum and maximum (2 K,) of the values in each time interval, alternating.
+
+    The values (N,) of a log's ticks, and the extremes, are NaN where unknown. The last interval
+    between the edges (K + 1,), s, includes all later ticks.
+    """
+    starts = np.searchsorted(log.time, edges[:-1])
+    lowest_and_highest = np.full((len(starts), 2), np.nan)
+    inside = np.flatnonzero(np.diff(np.append(starts, len(values))) > 0)
+    if len(inside):
+        finite = np.where(np.isfinite(values), values, np.nan)
+        for side, ufunc in enumerate((np.fmin, np.fmax)):
+            lowest_and_highest[inside, side] = ufunc.reduceat(finite, starts[inside])
+    return lowest_and_highest.ravel()
+
+
+def flight_marks(log: FlightLog) -> list[Mark]:
+    """Return the marks of a flight, by time; invalid entries of the bag are ignored."""
+    period = log.timebase.period
+    start = log.first_tick * period
+    end = start + log.ticks * period
+    marks = list(_fault_marks(log))
+    with suppress(InputError):
+        for event in events_of(log):
+            text = f"capture {event.target.name}" if isinstance(event, Capture) else "release"
+            marks.append(Mark(event.time_s, event.time_s, text, "event"))
+    for before, law in pairwise(laws_of(log)):
+        time = law.tick * period
+        marks.append(Mark(time, time, str(LawChange(before, law)), "law"))
+    for begin, stop in shadow_intervals(log):
+        marks.append(Mark(begin, stop, "in the Earth's shadow", "shadow"))
+    return sorted(mark for mark in marks if mark.start < end and mark.stop >= start)
+
+
+def _fault_marks(log: FlightLog) -> Iterator[Mark]:
+    for text in log.flight.get("faults", ()):
+        with suppress(InputError):
+            fault = parse_fault(str(text), KINDS)
+            stop = fault.stop_s if fault.kind.lasts else fault.start_s
+            yield Mark(fault.start_s, stop, f"{fault.kind.name} {fault.argument}".strip(), "fault")
+
+
+def shared_marks(flights: Mapping[str, FlightLog]) -> list[Mark]:
+    """Return the marks of some flights, by time, with flight names unless all have the mark."""
+    own_marks = {name: flight_marks(log) for name, log in flights.items()}
+    shared = []
+    for mark in sorted({mark for marks in own_marks.values() for mark in marks}):
+        names = [name for name, marks in own_marks.items() if mark in marks]
+        text = mark.text if len(names) == len(flights) else f"{', '.join(names)}: {mark.text}"
+        shared.append(mark._replace(text=text))
+    return shared

@@ -17,6 +17,7 @@ from space_robot_msgs_py.errors import InputError
 from ..analysis.errors import controls_base
 
 Array = NDArray[np.float64]
+RowIndices = NDArray[np.intp]
 Move = Callable[[int], None]
 """Updates a part of a scene to the k-th frame; called for k = 0, 1, ..."""
 
@@ -32,12 +33,12 @@ STATE = ("base_position", "quaternion", "joint_positions", "passive_positions")
 
 @dataclass(frozen=True)
 class Frames:
-    """The motion of a robot at K times."""
+    """The motion of a robot at K times, inertial frame."""
 
     time: Array
     """(K,) time, s."""
     base_position: Array
-    """(K, 3) m, inertial frame."""
+    """(K, 3) m."""
     base_quaternion: Array
     """(K, 4) ``[w, x, y, z]``."""
     joint_positions: Array
@@ -45,21 +46,16 @@ class Frames:
     joints: list[Transform]
     """Transforms of all joints, parents before children."""
     tools: dict[str, Array]
-    """(K, 3) position of each tool, m, inertial frame."""
+    """(K, 3) position of each tool, m."""
     desired: Array | None
-    """(K, 3) desired position of the first tool, m, inertial frame; or None. For a mission of
-    waypoints it is that for the true base position."""
+    """(K, 3) desired position of the first tool, m; or None. For a mission of waypoints it is
+    that for the true base position."""
 
     @classmethod
     def of(cls, log: FlightLog, robot: Robot, times: Array, wanted: Array | None = None) -> Frames:
-        """Sample a flight; between ticks, and after its end, the last state is held.
+        """Sample a flight at ``times`` (K,), s; between ticks the last state is held.
 
-        Args:
-            log: the flight, with true states.
-            robot: that flew.
-            times: (K,) s.
-            wanted: (N, 3) m, places of the first tool that the mission leads it through; None: it
-                does not.
+        ``wanted`` (N, 3), m, are the positions to which a mission leads the first tool.
 
         Raises:
             InputError: no tick of the flight has a complete state.
@@ -77,23 +73,15 @@ class Frames:
             t._replace(position=rounded(t.position), quaternion=rounded(t.quaternion))
             for t in joint_transforms(robot, angles)
         ]
-        return cls(
-            times,
-            rounded(position),
-            rounded(quaternion),
-            angles,
-            joints,
-            tools,
-            _desired(log, robot, rows) if wanted is None else wanted[rows],
-        )
+        desired = _desired(log, robot, rows) if wanted is None else wanted[rows]
+        position, quaternion = rounded(position), rounded(quaternion)
+        return cls(times, position, quaternion, angles, joints, tools, desired)
 
 
 def shown_times(logs: Sequence[FlightLog], rate: float) -> Array:
-    """Return the times, s, of the frames of some flights: ticks of the first one.
+    """Return the times, s, of the frames of some flights, ticks of the first one.
 
-    Args:
-        logs: of the flights, none of them empty.
-        rate: frames per second; reduced for long flights.
+    The ``rate``, frames per second, is reduced for long flights. No log is empty.
     """
     start = min(float(log.time[0]) for log in logs)
     end = max(float(log.time[-1]) for log in logs)
@@ -105,43 +93,30 @@ def shown_times(logs: Sequence[FlightLog], rate: float) -> Array:
     return times
 
 
-def held_rows(log: FlightLog, columns: Sequence[str], times: Array) -> NDArray[np.intp]:
-    """Return the rows of a flight to be shown at some times: the last complete ones.
+def held_rows(log: FlightLog, columns: Sequence[str], times: Array) -> RowIndices:
+    """Return the rows (K,) of a flight to be shown at ``times``: the last with all ``columns``.
 
-    Args:
-        log: the flight.
-        columns: that must be finite.
-        times: (K,) s; before the first complete row it is that one.
-
-    Returns:
-        (K,), or (0,) if no row is complete.
+    Before the first complete row it is that one; (0,) if no row is complete.
     """
     known = np.flatnonzero(log.finite(columns))
-    if not len(known):
-        return known
+    return known[frame_rows(log, times, known)] if len(known) else known
+
+
+def frame_rows(log: FlightLog, times: Array, rows: RowIndices | slice = slice(None)) -> RowIndices:
+    """Return the number of the last of a flight's ``rows`` at or before each time, or 0."""
     # times are rounded: the nearest tick is meant
     due = times + 0.5 * log.timebase.period
-    at = np.searchsorted(log.time[known], due, side="right") - 1
-    return np.asarray(known[np.maximum(at, 0)])
+    return np.asarray(np.maximum(np.searchsorted(log.time[rows], due, side="right") - 1, 0))
 
 
-def frame_rows(log: FlightLog, times: Array) -> NDArray[np.intp]:
-    """Return the last row (K,) of a flight at or before each frame."""
-    due = times + 0.5 * log.timebase.period
-    at = np.searchsorted(log.time, due, side="right") - 1
-    return np.asarray(np.maximum(at, 0))
-
-
-def _desired(log: FlightLog, robot: Robot, rows: NDArray[np.intp]) -> Array | None:
+def _desired(log: FlightLog, robot: Robot, rows: RowIndices) -> Array | None:
     """Return the first tool's desired positions, (K, 3) m, with passive joints at rest."""
     if not controls_base(log):
         return None
     reference, joints = log.reference_base[rows, :4], log.reference_joints[rows, 0]
-    rest = np.broadcast_to(
-        [spring.rest for spring in robot.springs], (len(rows), len(robot.springs))
-    )
     if not (np.isfinite(reference).all() and np.isfinite(joints).all()):
         return None
+    rest = np.tile([spring.rest for spring in robot.springs], (len(rows), 1))
     _, offset = tool_pose(robot, unit_rows(reference), np.hstack([joints, rest]))
     return log.base_position[rows] + offset
 

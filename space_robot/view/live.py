@@ -1,7 +1,4 @@
-"""Live scene of a running flight of this machine, for its browsers.
-
-The newest states and references are a short `FlightLog`, drawn as that of a bag.
-"""
+"""Live scene of a running flight of this machine, whose newest states are a short `FlightLog`."""
 
 from __future__ import annotations
 
@@ -10,9 +7,9 @@ import json
 import math
 import time
 from collections import deque
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from contextlib import closing, suppress
-from itertools import count, cycle
+from itertools import cycle
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -29,16 +26,16 @@ from space_robot_msgs_py.errors import MessageError
 from space_robot_msgs_py.ros.locks import living_nodes
 from space_robot_msgs_py.samples import Timebase
 from space_robot_msgs_py.wire.definitions import decode
-from space_robot_msgs_py.wire.messages import Codec, describe
+from space_robot_msgs_py.wire.messages import Codec, MessageDescription, describe
 from space_robot_msgs_py.wire.telemetry import LawCodec
 
 from ..analysis.analysed_log import AnalysedLog
-from ..analysis.plotted import quantities_of
+from ..analysis.plotted import PlottedQuantity, quantities_of
 from ..flight.graph.domain import domain_asked_for
 from ..flight.graph.monitor import Monitor
 from ..flight.graph.node_names import PLANT
-from .extent import extent
 from .scene import RobotScene, local_server, palette, rgb
+from .shapes import extent
 from .stage import clearest_side, set_stage
 
 if TYPE_CHECKING:
@@ -46,7 +43,7 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-RATE_HZ, TELL_EVERY, ROWS = 30, 6, 300
+RATE_HZ, PANEL_EVERY, ROWS = 30, 6, 300
 """Frames a second, frames between updates of texts and curves, and rows of the log: ten seconds."""
 KEPT, CHUNKS_KEPT = 4, 50
 """Number of kept states per topic, so that all have one of the same tick, and of references."""
@@ -65,12 +62,8 @@ def serve(
 ) -> Iterator[str]:
     """Serve one flight after the other; yield the page's address, then what happens, in words.
 
-    Args:
-        domain: ROS domain; None: ROS_DOMAIN_ID, or that of the last started flight.
-        namespace: of the robot; empty: any.
-        port: of the page; the next free one if it is in use.
-        dark: whether the page is light on dark.
-        plots: kinds of the curves that are shown first; empty: the usual ones.
+    Without a ``domain`` that of ROS_DOMAIN_ID or of the last started flight is followed, without
+    a ``namespace`` any. Of ``plots``, kinds, the curves are shown first; empty: the usual ones.
     """
     namespace, wanted = full_namespace(namespace) if namespace else "", domain_asked_for(domain)
     with local_server(port) as server:
@@ -79,40 +72,35 @@ def serve(
         yield f"http://127.0.0.1:{server.get_port()}"
         while True:
             yield WAITING
-            while not (places := _places(wanted, namespace)):
+            while not (places := _plants(wanted, namespace)):
                 time.sleep(0.5)
             yield f"following the flight in {places[0][1]} of ROS domain {places[0][0]}"
             _follow(server, places[0], dark, plots)
             yield OVER
 
 
-def _places(domain: int | None, namespace: str) -> list[tuple[int, str]]:
-    """Return domain and namespace of this machine's plants, the last started one first."""
+def _plants(domain: int | None, namespace: str) -> list[tuple[int, str]]:
     return [place for place in living_nodes(PLANT, namespace) if domain in (None, place[0])]
 
 
 def _follow(server: ViserServer, place: tuple[int, str], dark: bool, plots: Sequence[str]) -> None:
-    """Show a flight until its end."""
     view, is_over = None, False
     with closing(Feed(place)) as feed:
-        for frame in count():
-            if feed.poll():
-                view = view or LiveView(server, feed, dark, plots)
-                view.show()
-            if frame % TELL_EVERY == 0:
-                is_over = place not in _places(*place)
-                if view:
-                    view.tell(OVER if is_over else "")
-            if is_over:
-                return
-            time.sleep(1.0 / RATE_HZ)
+        while not is_over:
+            for _ in range(PANEL_EVERY):
+                if feed.poll():
+                    view = view or LiveView(server, feed, dark, plots)
+                    view.show()
+                time.sleep(1.0 / RATE_HZ)
+            is_over = place not in _plants(*place)
+            if view:
+                view.update_panel(OVER if is_over else "")
 
 
 class Feed:
     """The newest seconds of a running robot: true states if they are published, else measured."""
 
     def __init__(self, place: tuple[int, str]) -> None:
-        """Join the graph in a domain and namespace."""
         from space_robot_msgs_py.ros.endpoints import PolledCallbackGroup, RawSubscription
 
         self.monitor, group = Monitor(*place, "viewer"), PolledCallbackGroup()
@@ -125,18 +113,16 @@ class Feed:
             self._tables[topic] = deque[tuple[int, Array]](maxlen=kept)
         self._laws = RawSubscription(node, topics.LAW, group)
         self._description = RawSubscription(node, topics.PLANT_DESCRIPTION, group)
-        self._codecs: dict[topics.Topic, Codec] = {}
+        self._described: dict[topics.Topic, MessageDescription] = {}
         self.law = ""
 
     def _begin(self, flight: dict[str, Any]) -> None:
-        """Make an empty log of what the plant describes."""
         self.robot = Robot.from_dict(flight["robot_file"])
         self.actuators = BaseActuatorSettings(**flight.get("base_actuators", {}))
         names = self.actuators.robot_names(self.robot)
         ticks = Timebase(round(flight["period"] * 1e9))
-        self._period_ns = ticks.period_ns
         self._described = {topic: describe(topic, names, ticks) for topic in self._subscriptions}
-        self._codecs = {topic: Codec(described) for topic, described in self._described.items()}
+        self._codecs = {topic: Codec(self._described[topic]) for topic in self._described}
         self.log, self.time = FlightLog.allocate(ROWS, names, ticks), np.full(ROWS, np.nan)
         """The newest states, the last one at the end, and their times, s."""
         self.log.flight = {key: flight[key] for key in DESCRIPTION_KEYS if key in flight}
@@ -149,25 +135,24 @@ class Feed:
                 self.law = LawCodec.decode(data, 0).name
         if (data := self._description.take()) is not None:
             self._begin(json.loads(decode(data, topics.PLANT_DESCRIPTION.type).data))
-        for topic, codec in self._codecs.items():  # none before the description
+        for topic, described in self._described.items():
             while (data := self._subscriptions[topic].take()) is not None:
                 with suppress(MessageError):  # another robot's
-                    stamp_ns, numbers = codec.decode(data)
-                    table = numbers.reshape(-1, self._described[topic].width).copy()
-                    last_ns = stamp_ns + (len(table) - 1) * self._period_ns
+                    stamp_ns, numbers = self._codecs[topic].decode(data)
+                    table = numbers.reshape(-1, described.width).copy()
+                    last_ns = stamp_ns + (len(table) - 1) * self.log.timebase.period_ns
                     self._tables[topic].append((last_ns, table))
         kinds = topics.TRUTH if all(map(self._tables.get, topics.TRUTH)) else MEASURED
         if not all(map(self._tables.get, kinds)):
             return False
         stamp_ns = min(self._tables[kind][-1][0] for kind in kinds)
-        rows = {topic: self._row(topic, stamp_ns) for topic in (*kinds, *DESIRED_MOTION)}
         stamp_s, before = 1e-9 * stamp_ns, self.time[-1]
+        rows = {topic: self._row(topic, stamp_ns) for topic in (*kinds, *DESIRED_MOTION)}
         if before - 1.0 < stamp_s <= before or any(rows[kind] is None for kind in kinds):
             return False  # faults may send an old state
         for column in (self.time, *self.log.columns.values()):
-            if stamp_s < before:  # the simulation was reset
-                column[:] = np.nan
-            column[:-1], column[-1] = column[1:], np.nan
+            column[:-1] = np.nan if stamp_s < before else column[1:]  # earlier: it was reset
+            column[-1] = np.nan
         self.time[-1] = stamp_s
         rows |= {topic: self._tables[topic][-1][1][-1] for topic in HARDWARE if self._tables[topic]}
         for topic, row in rows.items():
@@ -180,7 +165,7 @@ class Feed:
 
     def _row(self, topic: topics.Topic, stamp_ns: int) -> Array | None:
         for last_ns, table in reversed(self._tables[topic]):
-            if 0 <= (back := (last_ns - stamp_ns) // self._period_ns) < len(table):
+            if 0 <= (back := (last_ns - stamp_ns) // self.log.timebase.period_ns) < len(table):
                 return np.asarray(table[-1 - back])
         return None
 
@@ -188,6 +173,12 @@ class Feed:
         """Return position and attitude of the base, and positions of all joints."""
         log = self.log  # measured quaternions are not exactly of unit length
         return log.base_position[rows], unit_rows(log.quaternion[rows]), log.all_positions[rows]
+
+    def quantities(self, kinds: Collection[str] = ()) -> Iterator[tuple[str, PlottedQuantity]]:
+        """Return what can be plotted, with its kind, see `quantities_of`."""
+        flight = AnalysedLog(self.log)
+        flight.robot, flight.actuators = self.robot, self.actuators
+        return quantities_of(flight, kinds)
 
 
 class LiveView:
@@ -199,10 +190,10 @@ class LiveView:
         scene.reset()
         gui.reset()
         gui.main_panel.dock_right()
-        position, *pose = feed.pose(slice(-1, None))
-        points = extent(robot, position, *pose)
+        position, quaternion, angles = feed.pose(slice(-1, None))
+        points = extent(robot, position, quaternion, angles)
         middle, size = points.mean(axis=0), float(np.ptp(points, axis=0).max())
-        side = clearest_side([(robot, pose[0], pose[1])])
+        side = clearest_side([(robot, quaternion, angles)])
         set_stage(server, middle + ROOM * (points - middle), dark, side=side)
         self._robot = RobotScene(scene, "/robot", robot)
         nothing, colour = np.zeros((1, 2, 3)), rgb(colours[0])
@@ -210,42 +201,29 @@ class LiveView:
         self._words, self._began = gui.add_html(""), (time.monotonic(), feed.time[-1])
         ink = "#c9d1d9" if dark else "#333333"
         axis: Any = {"stroke": ink, **{key: {"stroke": f"{ink}33"} for key in ("grid", "ticks")}}
+        style: Any = {"height": 150, "legend": {"show": False}, "scales": {"x": {"time": False}}}
         folder, self._plots = gui.add_folder("Plots", expand_by_default=False), dict[str, Any]()
-        for kind, quantity in quantities_of(self._flight):
-            lines: list[Any] = [
-                {"label": label, "stroke": colour, "width": 1.5}
-                for label, colour in zip(quantity.labels, cycle(colours), strict=False)
-            ]
+        for kind, quantity in feed.quantities():
+            lines: list[Any] = [{"label": "s"}]
+            for label, stroke in zip(quantity.labels, cycle(colours), strict=False):
+                lines.append({"label": label, "stroke": stroke, "width": 1.5})
+            empty = tuple(np.zeros((len(lines), 2)))
             plot = gui.add_uplot(
-                tuple(np.zeros((len(lines) + 1, 2))),
-                ({"label": "s"}, *lines),
-                title=quantity.label,
-                height=150,
-                axes=(axis, axis),
-                scales={"x": {"time": False}},
-                legend={"show": False},
+                empty, tuple(lines), title=quantity.label, axes=(axis, axis), **style
             )
+            is_shown = kind in plots if plots else quantity.is_shown
             with folder:
-                box = gui.add_checkbox(
-                    quantity.title, kind in plots if plots else quantity.is_shown
-                )
-            self._plots[quantity.label] = kind, box, plot
-
-    @property
-    def _flight(self) -> AnalysedLog:
-        flight = AnalysedLog(self._feed.log)
-        flight.robot, flight.actuators = self._feed.robot, self._feed.actuators
-        return flight
+                self._plots[quantity.label] = kind, gui.add_checkbox(quantity.title, is_shown), plot
 
     def show(self) -> None:
         """Move the robot."""
         # twice, because the scene treats a single row as a constant transform
         (position,), (quaternion,), angles = self._feed.pose(slice(-1, None))
+        links = joint_transforms(self._feed.robot, np.tile(angles, (2, 1)))
         with self._server.atomic():
-            links = joint_transforms(self._feed.robot, np.tile(angles, (2, 1)))
             self._robot.move(position, quaternion, links, 0)
 
-    def tell(self, note: str = "") -> None:
+    def update_panel(self, note: str) -> None:
         """Update text, trails and curves; ``note`` is an additional sentence."""
         feed, known = self._feed, np.isfinite(self._feed.time)
         speed = (feed.time[-1] - self._began[1]) / max(time.monotonic() - self._began[0], 0.1)
@@ -261,9 +239,9 @@ class LiveView:
             for _, box, plot in self._plots.values():
                 plot.visible = box.value
             shown = {kind for kind, box, _ in self._plots.values() if box.value}
-            for _, quantity in quantities_of(self._flight, shown) if shown else ():
+            for _, quantity in feed.quantities(shown) if shown else ():
                 if quantity.label in self._plots:
-                    _, _, plot = self._plots[quantity.label]
+                    *_, plot = self._plots[quantity.label]
                     values = quantity.values[known]
                     largest = float(np.nanmax(np.abs(values), initial=0.0))
                     # the plot's tick labels have no exponents, so small values are scaled

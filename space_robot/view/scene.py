@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from space_robot_model.elementary.matrices import unit_rows
 from space_robot_model.elementary.rotations import quaternion_of_rotation
 from space_robot_model.robot import Robot
-from space_robot_model.robot.parts import Visual
+from space_robot_model.robot.parts import Colour, Visual
 from space_robot_model.robot.placements import (
     Transform,
     frame_names,
@@ -21,12 +21,14 @@ from space_robot_model.robot.placements import (
     tool_transforms,
 )
 
-from .shapes import Mesh, parts_of, shown_shapes
+from .meshes import Mesh
+from .shapes import drawn_parts, shown_shapes
 
 if TYPE_CHECKING:
     from viser import FrameHandle, SceneApi, SceneNodeHandle, ViserServer
 
 Array = NDArray[np.float64]
+RGB = tuple[int, int, int]
 
 AXES = 0.08
 """Length of a tool's axes relative to that of all links."""
@@ -44,10 +46,9 @@ def palette(dark: bool) -> tuple[str, ...]:
 
 @contextmanager
 def local_server(port: int = 0) -> Iterator[ViserServer]:
-    """Serve scenes to browsers on this machine only, on 127.0.0.1, without output.
+    """Serve scenes to browsers of this machine, on 127.0.0.1, without output.
 
-    Args:
-        port: to listen on; the next free one if it is in use. 0: any.
+    If the ``port`` is in use it is the next free one; 0: any.
     """
     from rich import get_console
     from viser import ViserServer
@@ -76,24 +77,20 @@ class SceneStyle(NamedTuple):
     """Enlargement of shapes, m, so that overlapping robots have no coincident surfaces."""
 
 
+PLAIN = SceneStyle()
+
+
 class RobotScene:
-    """A robot in the scene with the frames of tf, such as ``/tde_stc/base_link/link1``."""
+    """A robot in the scene with the frames of tf, such as ``/tde_stc/base_link/link1``.
 
-    def __init__(
-        self, scene: SceneApi, root: str, robot: Robot, look: SceneStyle | None = None
-    ) -> None:
-        """Add the robot at the origin.
+    It stands at the origin below ``root``, its name in the scene, which begins with a slash.
+    """
 
-        Args:
-            scene: of a server.
-            root: name of the robot in the scene, beginning with a slash.
-            robot: to be drawn.
-            look: style of its shapes.
-        """
-        self._scene, self._robot, self._look = scene, robot, look or SceneStyle()
+    def __init__(self, scene: SceneApi, root: str, robot: Robot, style: SceneStyle = PLAIN) -> None:
+        self._scene, self._style = scene, style
         self._names = frame_names(robot).bodies
         base = self._names[0]
-        self._paths = {base: f"{root}/{_part(base)}"}
+        self._paths = {base: f"{root}/{_node_name(base)}"}
         self.base: FrameHandle = scene.add_frame(self._paths[base], show_axes=False)
         self._frames: dict[str, FrameHandle] = {}
         links = joint_transforms(robot, np.zeros((1, robot.joint_count)))
@@ -107,7 +104,7 @@ class RobotScene:
             self.add_shape(f"shape_{number}", shape, drawn.meshes.get(shape.mesh))
 
     def _add_frame(self, link: Transform, axes: float = 0.0) -> FrameHandle:
-        path = f"{self._paths[link.parent]}/{_part(link.child)}"
+        path = f"{self._paths[link.parent]}/{_node_name(link.child)}"
         while path in self._paths.values():  # a tool may have the name of a body
             path += "_"
         self._paths.setdefault(link.child, path)
@@ -121,28 +118,15 @@ class RobotScene:
         )
 
     def add_shape(self, name: str, shape: Visual, mesh: Mesh | None = None) -> SceneNodeHandle:
-        """Draw a shape on its body.
-
-        Args:
-            name: of the shape, unique on the body.
-            shape: to be drawn.
-            mesh: if the shape is a mesh.
-        """
+        """Draw a shape on its body, below which its ``name`` is unique."""
         path = f"{self._paths[self._names[shape.body]]}/{name}"
-        return add_shape(self._scene, path, shape, self._look, mesh)
+        return add_shape(self._scene, path, shape, self._style, mesh)
 
-    def move(self, position: Array, quaternion: Array, moved: Sequence[Transform], k: int) -> None:
-        """Move base and joints.
-
-        Args:
-            position: (3,) of the base, m, inertial frame.
-            quaternion: (4,) of the base.
-            moved: transforms from `joint_transforms`.
-            k: row of the transforms.
-        """
+    def move(self, position: Array, quaternion: Array, joints: Sequence[Transform], k: int) -> None:
+        """Move the base to (3,) m and (4,), inertial frame, and the joints to their k-th row."""
         set_pose(self.base, "position", position)
         set_pose(self.base, "wxyz", quaternion)
-        for link in moved:
+        for link in joints:
             frame = self._frames[link.child]
             if len(link.quaternion) > 1:
                 set_pose(frame, "wxyz", link.quaternion[k])
@@ -151,7 +135,7 @@ class RobotScene:
 
 
 def set_pose(frame: SceneNodeHandle, what: str, value: Array) -> None:
-    """Set a frame's pose exactly.
+    """Set a frame's ``position`` or ``wxyz`` exactly.
 
     viser ignores changes within the tolerance of `numpy.allclose`, 1e-5.
     """
@@ -162,51 +146,50 @@ def set_pose(frame: SceneNodeHandle, what: str, value: Array) -> None:
 
 
 def add_shape(
-    scene: SceneApi, path: str, shape: Visual, look: SceneStyle, mesh: Mesh | None = None
+    scene: SceneApi, path: str, shape: Visual, style: SceneStyle = PLAIN, mesh: Mesh | None = None
 ) -> SceneNodeHandle:
-    """Draw a shape below a node of the scene.
-
-    Args:
-        scene: of a server.
-        path: of the shape in the scene.
-        shape: to be drawn; its body is not used.
-        look: style of the shape.
-        mesh: if the shape is a mesh.
-    """
-    *own, alpha = shape.colour or GREY
-    red, green, blue = (round(255 * value) for value in own)
-    colour = rgb(look.tint) if look.tint else (red, green, blue)
-    opacity = alpha * look.opacity if alpha * look.opacity < 1.0 else None
+    """Draw a shape as a node of the scene; ``mesh`` is its file's, if it has one."""
+    colour = shape.colour or GREY
     pose: dict[str, Any] = {
         "position": shape.position,
         "wxyz": quaternion_of_rotation(shape.rotation),
-        "opacity": opacity,
     }
-    more = look.growth
-    if not look.tint and not look.growth and (parts := parts_of(shape)):
-        pose["opacity"] = look.opacity if look.opacity < 1.0 else None
+    if style == SceneStyle(opacity=style.opacity) and (parts := drawn_parts(shape)):
         nodes: list[SceneNodeHandle] = []
         for part in parts:
             name = f"{path}/{part.name}" if nodes else path
-            pose["color"] = tuple(round(255 * value) for value in part.colour[:3])
+            pose |= {"color": _bytes(part.colour), "opacity": _opacity(style.opacity)}
             nodes.append(scene.add_mesh_simple(name, *part.mesh, flat_shading=True, **pose))
-            pose = {"opacity": pose["opacity"]}  # the others are on the first one
+            pose = {}  # the others are on the first one
         return nodes[0]
+    pose["color"] = rgb(style.tint) if style.tint else _bytes(colour)
+    pose["opacity"] = _opacity(colour[3] * style.opacity)
+    more = style.growth
     if mesh is not None:
         flips = np.prod(shape.size) < 0.0  # mirrored: faces must be reversed
         faces = mesh.faces[:, ::-1] if flips else mesh.faces
-        vertices = mesh.vertices * shape.size
-        return scene.add_mesh_simple(path, vertices, faces, color=colour, flat_shading=True, **pose)
+        return scene.add_mesh_simple(
+            path, mesh.vertices * shape.size, faces, flat_shading=True, **pose
+        )
     if shape.shape == "box":
         x, y, z = (edge + 2.0 * more for edge in shape.size)
-        return scene.add_box(path, colour, (x, y, z), **pose)
+        return scene.add_box(path, dimensions=(x, y, z), **pose)
     if shape.shape == "cylinder":
         radius, length = shape.size[0] + more, shape.size[1] + 2.0 * more
-        return scene.add_cylinder(path, radius, length, colour, **pose)
-    return scene.add_icosphere(path, shape.size[0] + more, colour, **pose)
+        return scene.add_cylinder(path, radius, length, **pose)
+    return scene.add_icosphere(path, shape.size[0] + more, **pose)
 
 
-def rgb(colour: str) -> tuple[int, int, int]:
+def _bytes(colour: Colour) -> RGB:
+    red, green, blue = (round(255 * value) for value in colour[:3])
+    return red, green, blue
+
+
+def _opacity(value: float) -> float | None:
+    return value if value < 1.0 else None
+
+
+def rgb(colour: str) -> RGB:
     """Return red, green and blue, from 0 to 255, of a colour such as ``#E69F00``."""
     red, green, blue = bytes.fromhex(colour.removeprefix("#"))
     return red, green, blue
@@ -220,6 +203,6 @@ def turns_from_z(directions: Array) -> Array:
     return unit_rows(turns)
 
 
-def _part(name: str) -> str:
+def _node_name(name: str) -> str:
     """Return a name as a single component of a path in the scene."""
     return name.replace("/", "_") or "_"

@@ -9,16 +9,18 @@ from __future__ import annotations
 import zipfile
 from collections.abc import Iterator, Sequence
 from functools import lru_cache
-from itertools import product
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from space_robot_model.robot import Robot
 from space_robot_model.robot.parts import Colour, Plate, Visual
+from space_robot_model.robot.placements import base_axes, body_frames
 from space_robot_model.robot.shapes import BASE_COLOUR, PANEL_COLOUR, drawn_shapes, shapes_of
+
+from .meshes import Mesh, foil, frame, mesh_arrays, panel
 
 Array = NDArray[np.float64]
 
@@ -27,41 +29,24 @@ MOST_FACES = 60_000
 FINEST, COARSER = 400.0, 0.8
 """Initial number of grid cells along a mesh's longest edge for merging vertices, and its factor
 in the next attempt."""
-MOST_BYTES = 500_000_000
-"""Limit of a file's size, that of an archive's content included."""
-MOST_READ = 2_000_000
-"""Limit of vertices, and of faces, of a file."""
-FRAME = 0.022
-"""Width of the frame's struts relative to the shortest edge of the box."""
-INSET = 0.12
-"""Depth of the foil below the frame relative to the struts' width."""
-FOIL_CELLS, CREASE, FOIL_SEED = 9, 0.012, 1
-"""Facets along an edge of the foil, and their depth relative to the shortest edge of the box."""
+MOST_BYTES, MOST_READ = 500_000_000, 2_000_000
+"""Limit of a file's size, that of an archive's content included; of its vertices, and faces."""
+FRAME, INSET = 0.022, 0.12
+"""Width of the frame's struts relative to the shortest edge of the box, and depth of the foil
+below the frame relative to that width."""
 FLAT = 0.2
 """A box is a panel if its shortest edge is below this share of the next one."""
 THICKNESS = 0.02
 """Thickness of a plate of the robot's file, m."""
 ABSORBED = 0.5
 """Smallest absorbed share of the light of plates that are drawn with solar cells."""
-CELLS = 8
-"""Solar cells along the longer edge of a panel."""
-MARGIN, SEAM = 0.03, 0.06
-"""Margin of a panel without cells relative to its shorter edge, and gap relative to a cell."""
-SIDES, SPOKES = 24, 3
-"""Facets around a wheel, and its spokes."""
+SMALLEST = 0.1
+"""Size of a base without shapes, m."""
+CORNERS = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], dtype=float)
 TARGET_COLOUR: Colour = (0.85, 0.38, 0.22, 1.0)
 FRAME_COLOUR: Colour = (0.36, 0.38, 0.42, 1.0)
 BACK_COLOUR: Colour = (0.70, 0.71, 0.74, 1.0)
 CELL_COLOUR: Colour = (0.06, 0.12, 0.34, 1.0)
-
-
-class Mesh(NamedTuple):
-    """A triangle mesh."""
-
-    vertices: Array
-    """(V, 3) vertices in the file's unit."""
-    faces: NDArray[np.int64]
-    """(F, 3) indices of vertices, counterclockwise as seen from outside."""
 
 
 class ShapePart(NamedTuple):
@@ -101,20 +86,15 @@ def shown_shapes(robot: Robot) -> Shapes:
     if bare:
         drawn += [shape for shape in drawn_shapes(robot) if shape.body in bare]
     if not robot.visuals:
-        drawn += panels_of_plates(robot, drawn)
+        drawn += plate_panels(robot, drawn)
     return Shapes(tuple(drawn), meshes, remarks)
 
 
 @lru_cache(maxsize=32)
 def read_meshes(files: tuple[str, ...], most: int) -> tuple[dict[str, Mesh], tuple[str, ...]]:
-    """Read mesh files of any format supported by trimesh.
+    """Return meshes by file, and remarks on files that cannot be drawn or were simplified.
 
-    Args:
-        files: their paths.
-        most: maximum number of faces of all files; a file with more than its share is simplified.
-
-    Returns:
-        Meshes by file; remarks on files that cannot be drawn or were simplified.
+    ``most`` is the maximum number of faces of all files, which have equal shares of it.
     """
     meshes, remarks = dict[str, Mesh](), []
     for file in files:
@@ -149,7 +129,7 @@ def read_mesh(file: str) -> Mesh:
         limit = f"at most {MOST_BYTES / 1e6:g} MB are allowed"
         raise UnreadableMeshError(f"has {size / 1e6:.3g} MB, {limit}")
     try:
-        mesh = _mesh(trimesh.load_mesh(file))
+        mesh = mesh_arrays(trimesh.load_mesh(file))
     except Exception as error:  # every format has its own types
         reason = str(error).strip().split("\n")[0] or type(error).__name__
         raise UnreadableMeshError(reason) from None
@@ -176,8 +156,7 @@ def simplify(mesh: Mesh, most: int) -> Mesh:
         vertices = np.zeros((len(count), 3))
         np.add.at(vertices, number, mesh.vertices)
         faces = number[mesh.faces]
-        a, b, c = faces.T
-        faces = faces[(a != b) & (b != c) & (c != a)]
+        faces = faces[(faces != np.roll(faces, 1, axis=1)).all(axis=1)]
         _, first = np.unique(np.sort(faces, axis=1), axis=0, return_index=True)
         simplified = Mesh(vertices / count[:, np.newaxis], faces[np.sort(first)])
         cells *= COARSER
@@ -186,7 +165,7 @@ def simplify(mesh: Mesh, most: int) -> Mesh:
     return simplified
 
 
-def parts_of(shape: Visual) -> list[ShapePart]:
+def drawn_parts(shape: Visual) -> list[ShapePart]:
     """Return what a box in one of the colours of derived shapes is drawn as; empty: as it is."""
     if shape.shape != "box" or shape.colour is None:
         return []
@@ -204,15 +183,11 @@ def parts_of(shape: Visual) -> list[ShapePart]:
     return []
 
 
-def panels_of_plates(robot: Robot, boxes: Sequence[Visual]) -> Iterator[Visual]:
+def plate_panels(robot: Robot, boxes: Sequence[Visual]) -> Iterator[Visual]:
     """Yield panels for the plates of a robot's file that its derived boxes do not have.
 
     A file gives the area of a plate and not its outline: it is drawn as a square. Two plates back
     to back are one panel; plates in a box of their body are its own surface.
-
-    Args:
-        robot: without visuals.
-        boxes: derived shapes of its bodies.
     """
     drawn: list[Plate] = []
     for plate in robot.plates:
@@ -248,104 +223,100 @@ def _are_one(plate: Plate, other: Plate) -> bool:
     )
 
 
-def foil(size: Array) -> Mesh:
-    """Return a box of creased foil with edges (3,) m; creases go inwards."""
-    rng, count = np.random.default_rng(FOIL_SEED), FOIL_CELLS + 1
-    line = np.linspace(-0.5, 0.5, count)
-    inside = np.pad(np.ones((FOIL_CELLS - 1, FOIL_CELLS - 1)), 1)
-    first = (np.arange(FOIL_CELLS)[:, np.newaxis] * count + np.arange(FOIL_CELLS)).reshape(-1)
-    corners = np.column_stack([first, first + count, first + count + 1, first + 1])
-    squares = np.concatenate([corners[:, [0, 1, 2]], corners[:, [0, 2, 3]]])
-    grids = []
-    for axis, side in product(range(3), (1.0, -1.0)):
-        u, v = np.meshgrid(line, side * line, indexing="ij")  # its normal is outwards
-        along, across = (axis + 1) % 3, (axis + 2) % 3
-        grid = np.empty((*u.shape, 3))
-        grid[..., along], grid[..., across] = u * size[along], v * size[across]
-        depth = CREASE * size.min() * inside * rng.random(u.shape)
-        grid[..., axis] = side * (0.5 * size[axis] - depth)
-        grids.append(grid.reshape(-1, 3))
-    faces = [squares + number * count * count for number in range(len(grids))]
-    return Mesh(np.concatenate(grids), np.concatenate(faces))
+class BoundingBox(NamedTuple):
+    """The box around a drawn shape, on the axes of the shape."""
+
+    shape: Visual
+    middle: Array
+    """(3,) m, in the frame of the shape's body."""
+    half: Array
+    """(3,) half edges, m."""
+
+    @property
+    def corners(self) -> Array:
+        """(8, 3) m, in the frame of the shape's body."""
+        return np.asarray(self.middle + (CORNERS * self.half) @ self.shape.rotation.T)
 
 
-def frame(size: Array, width: float) -> Mesh:
-    """Return struts of a width, m, along the edges (3,) m of a box."""
-    struts = []
-    for axis, *signs in product(range(3), (0.5, -0.5), (0.5, -0.5)):
-        edges = np.full(3, width)
-        edges[axis] = size[axis]
-        place = np.insert(np.array(signs) * np.delete(size - width, axis), axis, 0.0)
-        struts.append(_box(edges, place))
-    return _joined(struts)
+def bounding_boxes(robot: Robot) -> list[BoundingBox]:
+    """Return the boxes around the drawn shapes of a robot."""
+    drawn, boxes = shown_shapes(robot), []
+    for shape in drawn.shapes:
+        size, middle = np.array(shape.size), np.zeros(3)
+        if (mesh := drawn.meshes.get(shape.mesh)) is not None:
+            ends = np.array([mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)]) * size
+            middle, half = ends.mean(axis=0), 0.5 * np.ptp(ends, axis=0)
+        elif shape.shape == "box":
+            half = 0.5 * size
+        elif shape.shape == "cylinder":
+            half = np.array([size[0], size[0], 0.5 * size[1]])
+        else:
+            half = np.full(3, size[0])
+        boxes.append(BoundingBox(shape, shape.position + shape.rotation @ middle, half))
+    return boxes
 
 
-def panel(size: Array) -> tuple[Mesh, Mesh]:
-    """Return a slab with edges (3,) m, and the solar cells on its two large sides."""
-    normal = int(np.argmin(size))
-    along, across = (normal + 1) % 3, (normal + 2) % 3
-    slab = size.copy()
-    slab[normal] *= 0.9
-    free = size - 2.0 * MARGIN * min(size[along], size[across])
-    pitch = max(free[along], free[across]) / CELLS
-    gap = np.array([0.5 * SEAM, 1.0 - 0.5 * SEAM])
-    counts = [max(1, round(free[axis] / pitch)) for axis in (along, across)]
-    u, v = ((np.arange(count)[:, np.newaxis] + gap) / count - 0.5 for count in counts)
-    corners = np.empty((2, *counts, 4, 3))
-    for k, (i, j) in enumerate(((0, 0), (1, 0), (1, 1), (0, 1))):
-        corners[..., k, along] = (free[along] * u[:, i])[:, np.newaxis]
-        corners[..., k, across] = free[across] * v[:, j]
-    corners[1] = corners[1, :, :, ::-1].copy()
-    corners[0, ..., normal], corners[1, ..., normal] = 0.5 * size[normal], -0.5 * size[normal]
-    first = 4 * np.arange(2 * counts[0] * counts[1])[:, np.newaxis]
-    faces = np.concatenate([first + np.array([0, 1, 2]), first + np.array([0, 2, 3])])
-    return _mesh(_box(slab, np.zeros(3))), Mesh(corners.reshape(-1, 3), faces)
+def extent(robot: Robot, position: Array, quaternion: Array, joint_positions: Array) -> Array:
+    """Return the corners of a robot's shapes in some poses, (K, 3) m, inertial frame.
+
+    Position (T, 3), m, and quaternion (T, 4) are the base's, positions (T, N), rad or m, those of
+    all joints.
+    """
+    frames = {f.body: f for f in body_frames(robot, base_axes(quaternion.T), joint_positions.T)}
+    corners = []
+    for box in bounding_boxes(robot):
+        frame = frames[box.shape.body]
+        for corner in box.corners:
+            corners.append(position + (frame.origin + frame.on_outer_axes(corner)).T)
+    return np.concatenate(corners)
 
 
-def wheel(radius: float, width: float) -> Mesh:
-    """Return a wheel about z, m: a rim, a hub and spokes, which make its turning visible."""
-    rim, hub = (
-        _revolved([(inner, -half), (outer, -half), (outer, half), (inner, half), (inner, -half)])
-        for inner, outer, half in (
-            (0.72 * radius, radius, 0.5 * width),
-            (0.0, 0.26 * radius, 0.6 * width),
-        )
-    )
-    spokes = []
-    for angle in 2.0 * np.pi * np.arange(SPOKES) / SPOKES:
-        size = np.array([0.62 * radius, 0.16 * radius, 0.5 * width])
-        spoke = _box(size, np.array([0.48 * radius, 0.0, 0.0]))
-        turn = np.eye(4)
-        turn[:2, :2] = [[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]]
-        spokes.append(spoke.apply_transform(turn))
-    return _joined([rim, hub, *spokes])
+def base_reach(robot: Robot) -> float:
+    """Return the largest distance, m, of the base's shapes from its frame's origin; 0 without."""
+    corners = [box.corners for box in bounding_boxes(robot) if box.shape.body == 0]
+    return float(np.linalg.norm(np.concatenate(corners), axis=1).max()) if corners else 0.0
 
 
-def cone(base: float, tip: float, height: float) -> Mesh:
-    """Return a closed cone or frustum along z; radii at the origin and at the other end, m."""
-    return _mesh(_revolved([(0.0, 0.0), (base, 0.0), (tip, height), (0.0, height)]))
+class BaseSurface:
+    """The surface of a robot's base, base frame."""
 
+    def __init__(self, robot: Robot) -> None:
+        # derived tubes and panels are on the base
+        self._boxes = [
+            box
+            for box in bounding_boxes(robot)
+            if not box.shape.body and (robot.visuals or box.shape.colour == BASE_COLOUR)
+        ]
 
-def _revolved(section: list[tuple[float, float]]) -> Any:
-    """Return a surface of revolution about z; the section goes counterclockwise in (r, z)."""
-    from trimesh.creation import revolve
+    @property
+    def size(self) -> float:
+        """Mean edge of the largest box, m."""
+        return max((float(np.mean(2.0 * box.half)) for box in self._boxes), default=SMALLEST)
 
-    return revolve(section, sections=SIDES)
+    def distance(self, start: Array, direction: Array) -> float:
+        """Return how far it is from a point (3,), m, along a unit vector until the last box ends.
 
+        It is 0 if no box is there.
+        """
+        farthest = 0.0
+        for shape, middle, half in self._boxes:
+            place, along = shape.rotation.T @ (start - middle), shape.rotation.T @ direction
+            with np.errstate(divide="ignore", invalid="ignore"):
+                sides = np.array([(-half - place) / along, (half - place) / along])
+            # along a side the ray is between its planes, or never inside
+            still = along == 0.0
+            if (np.abs(place) > half)[still].any():
+                continue
+            entry = float(sides.min(axis=0)[~still].max())
+            leaving = float(sides.max(axis=0)[~still].min())
+            if leaving >= max(entry, 0.0):
+                farthest = max(farthest, leaving)
+        return farthest
 
-def _box(size: Array, middle: Array) -> Any:
-    from trimesh.creation import box
-
-    return box(size).apply_translation(middle)
-
-
-def _joined(parts: list[Any]) -> Mesh:
-    from trimesh.util import concatenate
-
-    return _mesh(concatenate(parts))
-
-
-def _mesh(part: Any) -> Mesh:
-    """Return a mesh of trimesh as arrays."""
-    vertices = np.asarray(part.vertices, dtype=np.float64)
-    return Mesh(vertices, np.asarray(part.faces, dtype=np.int64))
+    def nearest(self, place: Array) -> Array:
+        """Return the nearest point to a place, (3,) m; a place in a box, or without one, itself."""
+        points = [
+            middle + shape.rotation @ np.clip(shape.rotation.T @ (place - middle), -half, half)
+            for shape, middle, half in self._boxes
+        ]
+        return min(points, key=lambda p: float(np.linalg.norm(p - place)), default=place)

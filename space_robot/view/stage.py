@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from importlib.util import find_spec
-from typing import TYPE_CHECKING, Literal, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,14 +12,13 @@ from scipy.spatial.transform import Rotation
 
 from space_robot_model.elementary.matrices import unit_rows
 from space_robot_model.elementary.rotations import quaternion_of_rotation
-from space_robot_model.orbit.elements import EARTH_RADIUS
 from space_robot_model.robot import Robot
 from space_robot_model.robot.placements import base_axes, body_frames
 from space_robot_msgs_py.config.installation import install_command
 from space_robot_msgs_py.errors import InputError
 
-from .extent import BaseSurface
 from .orbit import OrbitFrames
+from .shapes import BaseSurface
 
 if TYPE_CHECKING:
     from viser import DirectionalLightHandle, SceneApi, ViserServer
@@ -39,10 +38,9 @@ STARS_AT, STAR = 40.0, 0.0025
 """Distance of the stars relative to the size of the scene, and their size relative to that."""
 STAR_DARK, STAR_LIGHT = (130, 136, 150), (205, 209, 216)
 """Colours of the stars on dark and on light pages."""
-DISTANCE = 3000.0
-"""Distance of the Earth's centre relative to the size of the scene."""
-BEHIND = 2.0
-"""Distance of the stars in orbit relative to that."""
+DISTANCE, BEHIND = 3000.0, 2.0
+"""Distance of the Earth's centre relative to the size of the scene, and of the stars in orbit
+relative to that."""
 IN_SHADOW = 0.12
 """Intensity of the Sun's light in the Earth's shadow, relative to that outside: none would hide
 the robot."""
@@ -62,36 +60,6 @@ def check_viser() -> None:
     """
     if find_spec("viser") is None:
         raise InputError(f"view needs viser: {install_command('view')}")
-
-
-class Horizon(NamedTuple):
-    """Directions in a scene in orbit, at its first frame."""
-
-    axes: Array
-    """(3, 3) columns along the track, the orbit's normal and up, inertial axes."""
-    dip: float
-    """Angle of the Earth's limb below the horizontal, rad."""
-    sun: Array | None
-    """(3,) unit vector to the Sun; None: unknown."""
-
-    @classmethod
-    def of(cls, orbit: OrbitFrames) -> Horizon:
-        """Return the one of an orbit's first frame."""
-        up, velocity = orbit.up[0], orbit.velocity[0]
-        normal = np.cross(up, velocity)
-        normal /= np.linalg.norm(normal)
-        axes = np.column_stack([np.cross(normal, up), normal, up])
-        distance = float(np.linalg.norm(orbit.position[0]))
-        return cls(axes, float(np.arccos(EARTH_RADIUS / distance)), orbit.sun)
-
-    def camera_direction(self, direction: Array) -> Array:
-        """Return the direction (3,) from the robots to the initial camera, on `axes`.
-
-        It has x and y of the ``direction`` without the Earth; the limb is in its lower half.
-        """
-        elevation = np.clip(self.dip - LIMB * 0.5 * FIELD_OF_VIEW, 0.0, STEEPEST)
-        aside = direction[:2] / np.linalg.norm(direction[:2])
-        return np.array([*np.cos(elevation) * aside, np.sin(elevation)])
 
 
 class Stage(NamedTuple):
@@ -117,58 +85,62 @@ def set_stage(
     server: ViserServer,
     points: Array,
     dark: bool,
-    horizon: Horizon | None = None,
+    orbit: OrbitFrames | None = None,
     side: Array = SIDES[0],
 ) -> Stage:
-    """Add stars, axes, lights and the initial camera for some points.
+    """Add stars, axes, lights and the initial camera, to which all points are visible.
 
-    Args:
-        server: of the scene.
-        points: (K, 3) that must be visible, m, inertial frame.
-        dark: whether the page is light on dark.
-        horizon: of a scene in orbit.
-        side: (3,) of `SIDES`, where camera and lights are.
+    The ``points`` (K, 3) are in m, inertial frame; camera and lights are on a ``side`` (3,) of
+    `SIDES`.
     """
     scene, camera = server.scene, server.initial_camera
-    axes = horizon.axes if horizon else np.eye(3)
-    back = axes.T @ camera_direction(side, horizon)
-    scene.set_up_direction(axes[:, 2] if horizon else "+z")
+    axes = orbit.axes if orbit else np.eye(3)
+    back = axes.T @ camera_direction(side, orbit)
+    scene.set_up_direction(axes[:, 2] if orbit else "+z")
     scene.world_axes.visible = False
     points = points @ axes
     low, high = points.min(axis=0), points.max(axis=0)
     middle, size = 0.5 * (low + high), max(float(np.linalg.norm(high - low)), 0.1)
     earth_at = DISTANCE * size
-    stars_at = BEHIND * earth_at if horizon else STARS_AT * size
-    far = 2.0 * stars_at if horizon else 100.0 * size
+    stars_at = BEHIND * earth_at if orbit else STARS_AT * size
     corner = low - 0.05 * size
-    if horizon:
+    if orbit:
         corner[2] = middle[2]  # above the Earth
         points = np.vstack([points, corner])
-    _inertial_axes(scene, size, axes @ corner)
-    _stars(scene, axes @ middle, stars_at, dark, "float32" if horizon else "float16")
-    lamp = _light(scene, axes * side, horizon.sun if horizon else None)
+    _add_inertial_axes(scene, size, axes @ corner)
+    directions = unit_rows(np.random.default_rng(STAR_SEED).normal(size=(STARS, 3)))
+    scene.add_point_cloud(  # makes rotation visible
+        "/stars",
+        axes @ middle + stars_at * directions,
+        STAR_DARK if dark else STAR_LIGHT,
+        point_size=STAR * stars_at,
+        point_shape="circle",
+        precision="float32" if orbit else "float16",  # 16 bits end at 65,504 m
+    )
+    lamp = _add_lights(scene, axes * side, orbit.sun if orbit else None)
+    far = 2.0 * stars_at if orbit else 100.0 * size
     camera.fov, camera.near, camera.far = float(FIELD_OF_VIEW), 0.01 * size, far
-    if horizon or camera.up is not None:  # that of a flight before
+    if orbit or camera.up is not None:  # that of a flight before
         camera.up = axes[:, 2]
     camera.look_at = axes @ middle
     camera.position = axes @ (middle + _distance(points - middle, back) * back)
     return Stage(axes @ middle, size, earth_at, lamp)
 
 
-def camera_direction(side: Array, horizon: Horizon | None) -> Array:
+def camera_direction(side: Array, orbit: OrbitFrames | None) -> Array:
     """Return the unit vector (3,) from the robots to the initial camera, inertial axes.
 
-    Args:
-        side: (3,) of `SIDES`.
-        horizon: of a scene in orbit, whose camera is above the horizon on every side.
+    In orbit the camera is above the horizon on each ``side``, and the limb in its lower half.
     """
     direction = DIRECTION * side
-    if horizon:
-        return np.asarray(horizon.axes @ horizon.camera_direction(direction))
-    return np.asarray(direction / np.linalg.norm(direction))
+    if orbit is None:
+        return np.asarray(direction / np.linalg.norm(direction))
+    elevation = np.clip(orbit.dip - LIMB * 0.5 * FIELD_OF_VIEW, 0.0, STEEPEST)
+    aside = direction[:2] / np.linalg.norm(direction[:2])
+    return np.asarray(orbit.axes @ [*np.cos(elevation) * aside, np.sin(elevation)])
 
 
-def _inertial_axes(scene: SceneApi, size: float, corner: Array) -> None:
+def _add_inertial_axes(scene: SceneApi, size: float, corner: Array) -> None:
     """Draw inertial axes of a round length, which make drift and rotation visible."""
     length = 10.0 ** np.floor(np.log10(0.5 * size))
     scene.add_frame(
@@ -181,26 +153,7 @@ def _inertial_axes(scene: SceneApi, size: float, corner: Array) -> None:
     scene.add_label("/inertial/length", f"{length:g} m", position=(length, 0.0, 0.0))
 
 
-def _stars(
-    scene: SceneApi,
-    middle: Array,
-    distance: float,
-    dark: bool,
-    precision: Literal["float16", "float32"],
-) -> None:
-    """Draw stars, which make rotation visible; numbers of 16 bits end at 65,504 m."""
-    directions = unit_rows(np.random.default_rng(STAR_SEED).normal(size=(STARS, 3)))
-    scene.add_point_cloud(
-        "/stars",
-        middle + distance * directions,
-        STAR_DARK if dark else STAR_LIGHT,
-        point_size=STAR * distance,
-        point_shape="circle",
-        precision=precision,
-    )
-
-
-def _light(scene: SceneApi, axes: Array, sun: Array | None) -> DirectionalLightHandle:
+def _add_lights(scene: SceneApi, axes: Array, sun: Array | None) -> DirectionalLightHandle:
     """Add lights instead of viser's environment map, which may load late or not at all."""
     scene.configure_environment_map(None)
     scene.configure_default_lights(False)
@@ -233,20 +186,16 @@ def _distance(points: Array, back: Array) -> float:
 
 
 def clearest_side(
-    flights: Sequence[tuple[Robot, Array, Array]], horizon: Horizon | None = None
+    flights: Sequence[tuple[Robot, Array, Array]], orbit: OrbitFrames | None = None
 ) -> Array:
     """Return the first of `SIDES` where the base hides at most `MOST_HIDDEN` of the arms.
 
-    Or, if there is none, the one where it hides least.
-
-    Args:
-        flights: robots with the attitudes (T, 4) of their bases and the positions (T, N) of all
-            their joints, rad or m.
-        horizon: of a scene in orbit.
+    Or, if there is none, the one where it hides least. The flights are robots with the attitudes
+    (T, 4) of their bases and the positions (T, N) of all their joints, rad or m.
     """
     shares = []
     for side in SIDES:
-        direction = camera_direction(side, horizon)
+        direction = camera_direction(side, orbit)
         shares.append(float(np.mean([_hidden_share(*flight, direction) for flight in flights])))
         if shares[-1] <= MOST_HIDDEN:
             break
@@ -256,14 +205,7 @@ def clearest_side(
 def _hidden_share(
     robot: Robot, quaternion: Array, joint_positions: Array, direction: Array
 ) -> float:
-    """Return the share of actuated joints and tools that are behind the base.
-
-    Args:
-        robot: with the base.
-        quaternion: (T, 4) of the base.
-        joint_positions: (T, N) of all joints, rad or m.
-        direction: (3,) unit vector to a camera far away, inertial axes.
-    """
+    """Return the share of actuated joints and tools that the base hides in a direction (3,)."""
     surface, still = BaseSurface(robot), np.eye(3)[:, :, np.newaxis]
     frames = {f.body: f for f in body_frames(robot, still, joint_positions.T)}
     points = [frames[joint + 1].origin for joint in range(robot.n)]

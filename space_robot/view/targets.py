@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import replace
 from itertools import pairwise
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,7 +26,7 @@ from space_robot_sim.environment.neighbouring_orbit import free_fall
 from ..analysis.described import captures_of, events_of, orbit_of
 from ..analysis.momentum import happens_in
 from .frames import Move
-from .scene import RobotScene, SceneStyle, add_shape, set_pose
+from .scene import RobotScene, add_shape, set_pose
 from .shapes import TARGET_COLOUR
 
 if TYPE_CHECKING:
@@ -48,22 +48,18 @@ class Drift(NamedTuple):
     """(K, 4) of the axes in which its box is drawn."""
 
 
-def targets(
+def add_targets(
     scene: SceneApi, root: str, robot_scene: RobotScene, log: FlightLog, robot: Robot, times: Array
 ) -> list[Move]:
-    """Draw each target of a flight as a box of uniform density; nothing without targets.
+    """Draw each target of a flight as a box of uniform density; return what moves them.
 
-    Args:
-        scene: of a server.
-        root: name of the robot in the scene.
-        robot_scene: the robot that holds it.
-        log: the flight.
-        robot: that flew.
-        times: (K,) of the frames, s.
+    ``root`` is the name of the robot in the scene, ``times`` (K,), s, are those of the frames.
     """
     moves: list[Move] = []
     try:
-        for number, (event, after) in enumerate(_captures(log)):
+        pairs = pairwise([*events_of(log), None])
+        captures = [(event, after) for event, after in pairs if isinstance(event, Capture)]
+        for number, (event, after) in enumerate(captures):
             grasp = Grasp.of(robot, event.target)
             met = _as_met(event, log)
             if met:
@@ -74,12 +70,6 @@ def targets(
     except InputError:
         return moves
     return moves
-
-
-def _captures(log: FlightLog) -> list[tuple[Capture, Event | None]]:
-    """Return each capture and the event after it."""
-    pairs = pairwise([*events_of(log), None])
-    return [(event, after) for event, after in pairs if isinstance(event, Capture)]
 
 
 def _as_met(event: Capture, log: FlightLog) -> Capture | None:
@@ -130,9 +120,11 @@ def _drifts(
     elif body is not None and start > 0:
         yield "free", Drift(0, *body.poses(times[:start] - moment))
     if met and isinstance(after, Release) and (stop := _first(times, after.time_s)) < len(times):
-        tick = tick_from(after.time_s, period)
-        released = after_release(grasp, after.speed, int(tick), log, robot)
-        if released is not None:
+        tick = int(tick_from(after.time_s, period))
+        hand = _hand(grasp, log, robot, tick - log.first_tick)
+        if hand is not None:
+            push = after.speed * (hand.rotation @ grasp.tool_axes)[:, 2]  # of a spring
+            released = hand._replace(velocity=hand.velocity + push)
             yield "released", Drift(stop, *released.poses(times[stop:] - tick * period))
 
 
@@ -149,10 +141,9 @@ def _holding(scene: RobotScene, name: str, grasp: Grasp, start: int, stop: int) 
 
 
 def _drifting(scene: SceneApi, path: str, grasp: Grasp, drift: Drift) -> Move:
-    """Draw a target in free motion."""
     frame = scene.add_frame(path, show_axes=False, visible=drift.start == 0)
     box = even_box(grasp.mass, grasp.inertia, np.zeros(3), 0, TARGET_COLOUR)
-    add_shape(scene, f"{path}/box", box, SceneStyle())
+    add_shape(scene, f"{path}/box", box)
     end = drift.start + len(drift.positions)
 
     def move(k: int) -> None:
@@ -185,116 +176,73 @@ class FreeBody(NamedTuple):
     """(3, 3) inertia about the centre of mass, kg m2, body axes."""
 
     def poses(self, times: Array) -> tuple[Array, Array]:
-        """Return the poses at some times.
+        """Return centres of mass (K, 3), m, and attitudes (K, 4), by Euler's equations.
 
-        Args:
-            times: (K,) relative to the time of the state, s; monotonic, may be negative.
-
-        Returns:
-            (K, 3) centre of mass, m, inertial frame; (K, 4) attitude ``[w, x, y, z]``.
+        The ``times`` (K,) are relative to that of the state, s; monotonic, may be negative.
         """
-        positions = self.position + times[:, np.newaxis] * self.velocity
-        return positions, self._attitudes(times)
-
-    def _attitudes(self, times: Array) -> Array:
-        """Integrate Euler's equations without torque."""
         start = Rotation.from_matrix(self.rotation)
         momentum = self.rotation @ self.inertia @ self.rotation.T @ self.angular_velocity
         inverse = np.linalg.inv(self.inertia)
 
         def rate(_: float, quaternion: Array) -> Array:
-            axes = Rotation.from_quat(quaternion).as_matrix()
+            turn = inverse @ Rotation.from_quat(quaternion).inv().apply(momentum)  # body axes
             x, y, z, w = quaternion
-            turn = inverse @ (axes.T @ momentum)  # in body axes
             on_left = np.array([[w, -z, y], [z, w, -x], [-y, x, w], [-x, -y, -z]])
             return np.asarray(0.5 * on_left @ turn)
 
         farthest = float(times[np.argmax(np.abs(times))]) if len(times) else 0.0
-        if farthest == 0.0 or not self.angular_velocity.any():
-            quaternions = np.tile(start.as_quat(), (len(times), 1))
-        else:
-            solved = solve_ivp(
-                rate,
-                (0.0, farthest),
-                start.as_quat(),
-                dense_output=True,
-                rtol=ACCURACY,
-                atol=ACCURACY,
-            )
+        quaternions = np.tile(start.as_quat(), (len(times), 1))
+        if farthest and self.angular_velocity.any():
+            options: Any = {"dense_output": True, "rtol": ACCURACY, "atol": ACCURACY}
+            solved = solve_ivp(rate, (0.0, farthest), start.as_quat(), **options)
             assert solved.sol is not None  # dense output
             quaternions = solved.sol(times).T
-        return unit_rows(quaternions)[:, [3, 0, 1, 2]]
+        positions = self.position + times[:, np.newaxis] * self.velocity
+        return positions, unit_rows(quaternions)[:, [3, 0, 1, 2]]
 
 
 def before_capture(capture: Capture, log: FlightLog, robot: Robot) -> FreeBody | None:
-    """Return the state of a target just before its capture, with the axes of the grasping body.
+    """Return the state of a target just before its capture, on the axes of the grasping body.
 
     Its position is the tool's at the tick of the capture. Its velocities are those of the event;
-    relative ones are added to the tool's velocity over the previous tick.
-
-    Args:
-        capture: the event.
-        log: the flight.
-        robot: that flew.
-
-    Returns:
-        None if ``log`` does not have both ticks.
+    relative ones are added to the tool's velocity over the previous tick. None if ``log`` does
+    not have both ticks.
     """
     grasp = Grasp.of(robot, capture.target)
     row = tick_from(capture.time_s, log.timebase.period) - log.first_tick
-    if not 1 <= row < log.ticks:
-        return None
-    part = log.rows(int(row) - 1, int(row) + 1)
-    positions, rotations = held_poses(grasp, part, robot)
-    if not np.isfinite(positions).all() or not np.isfinite(rotations).all():
+    hand = _hand(grasp, log, robot, int(row), -1)
+    if hand is None:
         return None
     motion = capture.target.motion
     velocity, angular_velocity = np.array(motion.velocity), np.array(motion.angular_velocity)
     if motion.relative_to == "tool":
-        period, axes = log.timebase.period, rotations[1] @ grasp.tool_axes
-        turned = Rotation.from_matrix(rotations[1] @ rotations[0].T).as_rotvec()
-        velocity = axes @ velocity + (positions[1] - positions[0]) / period
-        angular_velocity = axes @ angular_velocity + turned / period
-    return FreeBody(positions[1], rotations[1], velocity, angular_velocity, grasp.inertia)
+        axes = hand.rotation @ grasp.tool_axes
+        velocity = axes @ velocity + hand.velocity
+        angular_velocity = axes @ angular_velocity + hand.angular_velocity
+    return hand._replace(velocity=velocity, angular_velocity=angular_velocity)
 
 
-def after_release(
-    grasp: Grasp, speed: float, tick: int, log: FlightLog, robot: Robot
+def _hand(
+    grasp: Grasp, log: FlightLog, robot: Robot, row: int, neighbour: int = 1
 ) -> FreeBody | None:
-    """Return the state of a target just after its release, with the axes of the grasping body.
-
-    Args:
-        grasp: that held it.
-        speed: m/s at which a spring pushes it off along z of the tool.
-        tick: of the release.
-        log: the flight.
-        robot: that flew.
-
-    Returns:
-        None if ``log`` does not have this tick and the next one.
-    """
-    row = tick - log.first_tick
-    if not 0 <= row < log.ticks - 1:
+    """Return the state of a held target in a row, its velocity from it to the neighbouring one."""
+    first = min(row, row + neighbour)
+    if not 0 <= first < log.ticks - 1:
         return None
-    positions, rotations = held_poses(grasp, log.rows(row, row + 2), robot)
+    positions, rotations = held_poses(grasp, log.rows(first, first + 2), robot)
     if not np.isfinite(positions).all() or not np.isfinite(rotations).all():
         return None
     period = log.timebase.period
-    push = speed * (rotations[0] @ grasp.tool_axes)[:, 2]
-    return FreeBody(
-        positions[0],
-        rotations[0],
-        push + (positions[1] - positions[0]) / period,
-        Rotation.from_matrix(rotations[1] @ rotations[0].T).as_rotvec() / period,
-        grasp.inertia,
-    )
+    turned = Rotation.from_matrix(rotations[1] @ rotations[0].T).as_rotvec()
+    velocity, here = (positions[1] - positions[0]) / period, row - first
+    return FreeBody(positions[here], rotations[here], velocity, turned / period, grasp.inertia)
 
 
 def held_poses(grasp: Grasp, log: FlightLog, robot: Robot) -> tuple[Array, Array]:
-    """Return the poses of a grasped target in each row of a log.
+    """Return the poses of a grasped target in each row of a log, inertial frame.
 
-    Returns:
-        (N, 3) centre of mass, m, inertial frame; (N, 3, 3) rotation matrices of the grasping body.
+    They are its centre of mass (N, 3), m, and the rotation matrices (N, 3, 3) of the body that
+    holds it.
     """
     axes = base_axes(log.quaternion.T)
     frames = body_frames(robot, axes, log.all_positions.T)

@@ -10,8 +10,8 @@ from typing import Any
 import pytest
 from command import Run
 
-from space_robot.paper.comparison import cells, claims
 from space_robot.paper.flights import (
+    COLUMNS,
     ROWS,
     VARIANTS,
     Equipment,
@@ -21,8 +21,12 @@ from space_robot.paper.flights import (
     fly,
     plan,
 )
-from space_robot.paper.reproduce import check_results_folder, reproduce
-from space_robot.paper.table_v import COLUMNS
+from space_robot.paper.reproduce import (
+    check_results_folder,
+    compare_with_table,
+    judge_claims,
+    reproduce,
+)
 from space_robot_msgs_py.errors import InputError
 
 SHORT = 0.4
@@ -32,7 +36,7 @@ SHORT = 0.4
 def time_delay_flights() -> list[Result]:
     """Every TDE row of Table V over the whole mission, printed gains, with friction and without."""
     return [
-        fly(row, Variant("printed", friction))
+        fly((row, Variant("printed", friction)))
         for row in ROWS
         if row.controller.startswith("tde")
         for friction in (True, False)
@@ -44,8 +48,8 @@ def test_verdicts_on_the_claims(time_delay_flights: list[Result]) -> None:
 
     Tuned TDE-TSMC is the smoother one, and payload and disturbance more than double an error.
     """
-    tuned = fly(TableRow("tde_tsmc", "1"), Variant("tuned", True))
-    judged = claims([*time_delay_flights, tuned], cells(time_delay_flights))
+    tuned = fly((TableRow("tde_tsmc", "1"), Variant("tuned", True)))
+    judged = judge_claims([*time_delay_flights, tuned], compare_with_table(time_delay_flights))
     assert [claim.holds for claim in judged] == [True] * 4 + [False, True, False, False, False]
     smoothest, *growth = judged[4:]
     assert smoothest.value == pytest.approx(0.95, rel=0.01)
@@ -55,9 +59,9 @@ def test_verdicts_on_the_claims(time_delay_flights: list[Result]) -> None:
 def test_tde_smc_chatters_as_the_prototype_did(time_delay_flights: list[Result]) -> None:
     """103, 2.6 and 0.33 N m/s."""
     variation = {
-        r.row.controller: r.metrics["base_torque.variation"]
+        r.row.controller: r.chatter["variation"]["base_torque"]
         for r in time_delay_flights
-        if r.chatters
+        if r.chatter
     }
     assert variation["tde_smc"] == pytest.approx(103.0, rel=0.05)
     assert variation["tde_tsmc"] == pytest.approx(2.6, rel=0.05)
@@ -66,7 +70,7 @@ def test_tde_smc_chatters_as_the_prototype_did(time_delay_flights: list[Result])
 
 def test_rows_fly_with_sensors_that_are_not_ideal() -> None:
     """And with the ideal ones if none are named."""
-    planned = TableRow("tde_stc", "1"), Variant("printed", True), 0.05, None
+    planned = (TableRow("tde_stc", "1"), Variant("printed", True)), 0.05, None
     ideal, noisy = fly(*planned), fly(*planned, Equipment("white_l1", "filtered"))
     told = [result.parameters["plant"] for result in (ideal, noisy)]
     assert [(plant["sensors"], plant["gyro"]["noise"]) for plant in told] == [
@@ -79,14 +83,16 @@ def test_rows_fly_with_sensors_that_are_not_ideal() -> None:
 
 
 def test_printed_computed_torque_gains_diverge_within_ticks() -> None:
-    result = fly(TableRow("ctc", "1"), Variant("printed", True))
+    result = fly((TableRow("ctc", "1"), Variant("printed", True)))
     assert result.metrics is None
     assert result.diverged_tick is not None
     assert result.diverged_tick < 20
-    (cell, *_) = cells([result])
+    (cell, *_) = compare_with_table([result])
     assert cell.measured is None
     assert cell.ratio is None
-    assert not claims([result], cells([result])), "a diverged flight decides no claim"
+    assert not judge_claims([result], compare_with_table([result])), (
+        "a diverged flight decides no claim"
+    )
 
 
 def test_what_is_flown_in_brief() -> None:

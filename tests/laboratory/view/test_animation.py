@@ -24,9 +24,8 @@ from space_robot.analysis import excerpt
 from space_robot.analysis.analysed_log import AnalysedLog
 from space_robot.analysis.plotted import quantities_of
 from space_robot.view.animation import DESIRED, PIECES, ShownFlight, animate, trails
-from space_robot.view.flights import ViewOptions, shown_robot
+from space_robot.view.flights import Mark, ViewOptions, flight_marks, shared_marks, shown_robot
 from space_robot.view.frames import MOST_FRAMES, Frames, shown_times
-from space_robot.view.plots import Mark, marks_of, shared_marks
 from space_robot_model.robot import Robot
 from space_robot_model.robot.placements import frame_names, tool_pose
 from space_robot_msgs_py.bag.flight_log import FlightLog
@@ -158,12 +157,12 @@ def test_events_faults_and_laws_are_marked_by_time(flown: Flown) -> None:
         events=["capture@0.1:small_satellite", "release@0.28"],
         faults=["stuck_joint@0.18:3=20", "drive_scale@0.15-0.2:all=0.9", "noise_gyro@2:1e-6"],
     )
-    assert marks_of(marked) == [CAPTURE, SCALE, STICK, SWAP, RELEASE]
-    assert marks_of(excerpt(marked, 0.16, 0.24)) == [SCALE, STICK]
-    assert marks_of(excerpt(marked, 0.1, 0.14)) == [CAPTURE]  # it begins with the excerpt
+    assert flight_marks(marked) == [CAPTURE, SCALE, STICK, SWAP, RELEASE]
+    assert flight_marks(excerpt(marked, 0.16, 0.24)) == [SCALE, STICK]
+    assert flight_marks(excerpt(marked, 0.1, 0.14)) == [CAPTURE]  # it begins with the excerpt
     faults = ["drive_scale@0.15-0.2:all=0.9", "no_such@1", "", 7]
     broken = replace(marked, laws=(), flight={"faults": faults, "events": ["capture@x", 3]})
-    assert marks_of(broken) == [SCALE]
+    assert flight_marks(broken) == [SCALE]
     other = replace(marked, flight={**marked.flight, "faults": []})
     shared = [mark.text for mark in shared_marks({"one": marked, "two": other})]
     faulty = [f"one: {SCALE.text}", f"one: {STICK.text}"]

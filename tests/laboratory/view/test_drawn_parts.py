@@ -24,21 +24,18 @@ from space_robot.view.actuators import (
     SHORTEST,
     STEP,
     ActuatorFrames,
-    slowdown_of,
     wheel_places,
+    wheel_slowdown,
 )
-from space_robot.view.extent import BaseSurface
 from space_robot.view.flights import ViewOptions
+from space_robot.view.meshes import cone, foil, frame, panel
 from space_robot.view.scene import RobotScene, local_server
 from space_robot.view.shapes import (
     BACK_COLOUR,
     THICKNESS,
-    cone,
-    foil,
-    frame,
-    panel,
-    panels_of_plates,
-    parts_of,
+    BaseSurface,
+    drawn_parts,
+    plate_panels,
     read_mesh,
     read_meshes,
     shown_shapes,
@@ -75,7 +72,7 @@ def ball(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_the_base_has_the_size_of_its_box_and_its_faces_look_outwards(
     size: tuple[float, ...],
 ) -> None:
-    parts = parts_of(box(size, BASE_COLOUR))
+    parts = drawn_parts(box(size, BASE_COLOUR))
     assert [part.name for part in parts] == ["foil", "frame"]
     vertices = np.concatenate([part.mesh.vertices for part in parts])
     np.testing.assert_allclose(np.ptp(vertices, axis=0), size)
@@ -107,9 +104,9 @@ def test_solar_cells_are_on_both_large_sides_and_nearly_cover_them(size: list[fl
 def test_what_a_file_draws_is_left_alone() -> None:
     """And what is on a spring and not flat."""
     for colour in ((0.1, 0.2, 0.3, 1.0), None, PANEL_COLOUR):
-        assert parts_of(box((1.0, 1.0, 1.0), colour)) == []
+        assert drawn_parts(box((1.0, 1.0, 1.0), colour)) == []
     sphere = Visual("sphere", (1.0,), np.eye(3), np.zeros(3), colour=BASE_COLOUR)
-    assert parts_of(sphere) == []
+    assert drawn_parts(sphere) == []
 
 
 def test_plates_beside_the_base_are_panels_of_their_area(paper_robot: Robot) -> None:
@@ -126,7 +123,7 @@ def test_plates_beside_the_base_are_panels_of_their_area(paper_robot: Robot) -> 
     assert second.size == pytest.approx((np.sqrt(2.0), np.sqrt(2.0), THICKNESS))
     np.testing.assert_allclose(second.rotation[:, 2], [0.6, 0.0, 0.8])
     assert (first.colour, second.colour) == (PANEL_COLOUR, BACK_COLOUR)
-    assert list(panels_of_plates(paper_robot, drawn)) == []
+    assert list(plate_panels(paper_robot, drawn)) == []
 
 
 def test_a_large_mesh_keeps_its_form_with_fewer_faces(
@@ -212,7 +209,7 @@ WHEELS = WheelSettings(
 
 @given(st.floats(0.0, 1e4), st.floats(0.0, 10.0))
 def test_a_drawn_wheel_neither_blurs_nor_seems_to_turn_back(speed: float, frame_s: float) -> None:
-    slowdown = slowdown_of(speed, frame_s)
+    slowdown = wheel_slowdown(speed, frame_s)
     drawn = speed / slowdown
     assert drawn <= FASTEST * (1.0 + 1e-12)
     assert drawn * frame_s <= LARGEST_TURN * (1.0 + 1e-12)
@@ -266,7 +263,7 @@ def test_the_page_turns_the_wheels_and_colours_those_at_a_limit(paper_robot: Rob
     page = page_of(paper_robot, one=log)
     scene = Scene(page)
     turned = cumulative_trapezoid(log.wheel_velocities, dx=0.01, axis=0, initial=0.0)
-    slowdown = slowdown_of(float(np.abs(log.wheel_velocities).max()), 0.04)
+    slowdown = wheel_slowdown(float(np.abs(log.wheel_velocities).max()), 0.04)
     assert f"Wheels turn {slowdown:g} times slower than in flight" in page
     for row in (0, 30, 100):
         poses = scene.poses(0.01 * row + 1e-6)

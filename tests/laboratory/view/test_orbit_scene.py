@@ -26,21 +26,18 @@ from scene_pages import (
 from scipy.spatial.transform import Rotation
 
 from space_robot.flight.plan import Scenario, resolve
-from space_robot.view.earth import ON_DARK_PAGE, Shades, earth_glb
-from space_robot.view.flights import ViewOptions
+from space_robot.view.flights import Mark, ViewOptions, flight_marks
 from space_robot.view.frames import shown_times
-from space_robot.view.orbit import OrbitFrames, shadow_intervals, sun_direction
-from space_robot.view.plots import Mark, marks_of
-from space_robot.view.scene import local_server, turns_from_z
-from space_robot.view.stage import (
-    DIRECTION,
-    FIELD_OF_VIEW,
-    LAMPS,
-    SIDES,
-    Horizon,
-    clearest_side,
-    set_stage,
+from space_robot.view.orbit import (
+    ON_DARK_PAGE,
+    OrbitFrames,
+    Shades,
+    earth_glb,
+    shadow_intervals,
+    sun_direction,
 )
+from space_robot.view.scene import local_server, turns_from_z
+from space_robot.view.stage import DIRECTION, FIELD_OF_VIEW, LAMPS, SIDES, clearest_side, set_stage
 from space_robot_model.robot import Robot
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.samples import ORBIT_FIELDS
@@ -139,7 +136,7 @@ def test_an_orbits_shadow_lasts_as_long_as_its_geometry_says(paper_robot: Robot)
     start, stop = ((np.pi + side * half - orbit.start) / orbit.rate for side in (-1, 1))
     ((dark_from, dark_to),) = shadow_intervals(log)
     assert (dark_from, dark_to) == (np.ceil(start), np.ceil(stop))
-    assert marks_of(log) == [Mark(dark_from, dark_to, "in the Earth's shadow", "shadow")]
+    assert flight_marks(log) == [Mark(dark_from, dark_to, "in the Earth's shadow", "shadow")]
     middle = int(0.5 * (start + stop))
     assert shadow_intervals(log.rows(middle, middle + 10)) == [(middle, np.inf)]
     frames = OrbitFrames.of(log, log.time)
@@ -361,7 +358,7 @@ def test_in_orbit_the_camera_sees_every_point_and_the_earth_below(
     now = np.zeros(1)
     frames = OrbitFrames(orbit.position(now), orbit.velocity(now), orbit.sun, np.zeros(1, bool))
     with local_server() as server:
-        stage = set_stage(server, points, dark=False, horizon=Horizon.of(frames))
+        stage = set_stage(server, points, dark=False, orbit=frames)
         camera, lamp = server.initial_camera, stage.lamp
         up, far = np.array(camera.up), camera.far
         axes, (wide, high, depth) = seen_by(camera, up, points)

@@ -17,8 +17,7 @@ from scipy.spatial.transform import Rotation
 
 from space_robot.analysis.analysed_log import AnalysedLog
 from space_robot.analysis.plotted import PlottedQuantity, quantities_of
-from space_robot.view.flights import PageBag, render
-from space_robot.view.plots import STRETCHES, Plot, Series, extremes, plots_of
+from space_robot.view.flights import STRETCHES, Plot, Series, extremes, flight_plots, render
 from space_robot_control.allocation.settings import assumed_actuators
 from space_robot_model.hardware.base_actuators import BaseActuatorSettings
 from space_robot_model.robot import Robot
@@ -152,11 +151,12 @@ def test_motors_are_ahead_of_their_joints_by_the_gears_deflection(
 
 def test_of_several_flights_each_has_the_size_of_each_quantity(paper_robot: Robot) -> None:
     logs = {"a": flight(paper_robot, ""), "b": flight(paper_robot, "none")}
-    plots = {p.title: p for p in plots_of(logs, dict.fromkeys(logs, paper_robot), ["#1", "#2"])}
+    _, drawn = flight_plots(logs, dict.fromkeys(logs, paper_robot), ["#1", "#2"])
+    plots = {plot.title: plot for plot in drawn}
     assert [s.label for s in plots["torque 1-3"].series] == ["a", "b"]
     assert [(s.label, s.colour) for s in plots["attitude drift"].series] == [("b", "#2")]
-    assert plots["attitude error"].is_logarithmic
-    assert not plots["base drift"].is_logarithmic
+    assert plots["attitude error"].logarithmic
+    assert not plots["base drift"].logarithmic
     size = np.linalg.norm(logs["a"].applied_torque[:, 3:6], axis=1)
     shown = plots["torque 1-3"].series[0].values
     assert len(shown) == 2 * STRETCHES
@@ -181,9 +181,9 @@ def test_the_page_has_whatever_names_and_values_of_four_digits(
     """And none where nothing can be drawn."""
     time = np.arange(len(values)) / 3.0
     series = [Series(name, "#112233", np.array(values)) for name in names]
-    plot = Plot(names[0], "", time, series, is_logarithmic)
-    shown = [PageBag(names[0], "#112233", names[0])]
-    page = render(names[0], "", shown, [plot], [], 0.0, True)
+    plot = Plot(names[0], "", series, is_logarithmic)
+    others: dict[str, Any] = {"marks": [], "flights": [], "arrows": {}, "notes": names}
+    page = render(names[0], True, time, [plot], scene=names[0], start=0.0, **others)
     (written,) = re.findall(r'<script id="data"[^>]*>(.*?)</script>', page, re.DOTALL)
     assert "<" not in written
     assert page.count("<script") == 3
