@@ -14,13 +14,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import betaincinv, gammaln, xlog1py, xlogy
 
-from space_robot.campaign.verdicts.requirements import projected_decision
-from space_robot.campaign.verdicts.share_test import (
+from space_robot.campaign.verdicts.requirements import (
     FixedSample,
     Sequential,
     ShareTest,
     first,
     log_evidence,
+    projected_decision,
 )
 
 Array = NDArray[np.float64]

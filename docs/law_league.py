@@ -18,9 +18,10 @@ import yaml
 
 from space_robot.analysis.figures.style import save_figure
 from space_robot.campaign.flown import FlownCampaign
+from space_robot.campaign.report.documents import sections
 from space_robot.campaign.report.figures import summary_figure
 from space_robot.campaign.report.findings import Findings
-from space_robot.campaign.report.tables import choice_tables, league_tables, sections
+from space_robot.campaign.report.tables import choice_tables, league_tables
 from space_robot.console.tables import Column, Group, Table, as_markdown
 
 HERE = Path(__file__).parent

@@ -35,7 +35,7 @@ def test_the_worst_flight_of_a_point_of_a_grid_is_that_of_the_page(
 ) -> None:
     row = rows(campaign)[point]
     *_, middle, spread, largest, worst, within = row
-    draws = Draws(read_study(campaign), SEED, RUNS[campaign], check=False)
+    draws = Draws(read_study(campaign), SEED, RUNS[campaign])
     flown = draws.scenario(int(worst), "ctc").fly()
     if campaign == "ets_vii":
         reached = np.degrees(flown.metrics["attitude_drift.max"])

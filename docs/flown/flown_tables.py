@@ -23,7 +23,7 @@ import numpy as np
 
 from space_robot import Scenario
 from space_robot.api.flown_flight import FlownFlight
-from space_robot.campaign.store.software import flight_digest
+from space_robot.campaign.flown.manifest import flight_digest
 
 DOCS = Path(__file__).parents[1]
 BEGINNING_S = 0.1

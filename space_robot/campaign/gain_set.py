@@ -37,9 +37,6 @@ def tuned_set(
         cases: names or paths of the environments.
         targets: of the user.
         step: called with a description of each step.
-
-    Raises:
-        InputError: a named file is missing, or the tuning options contradict each other.
     """
     plans = [validate(Scenario, {**options, "case": case}, "options") for case in cases]
     settings = [FlightSettings.resolve(plan) for plan in plans]
@@ -68,11 +65,7 @@ def tuned_set(
 
 
 def write_set(tuned: Tuned, command: str, folder: Path) -> list[Path]:
-    """Write the files of a set.
-
-    Raises:
-        InputError: the folder cannot be created or written.
-    """
+    """Write the files of a set."""
     make_folder(folder)
     paths = []
     for name, text in gain_files(tuned, command).items():

@@ -18,6 +18,7 @@ from space_robot_msgs_py.config.validation import StrictModel, read_yaml, short,
 from space_robot_msgs_py.errors import InputError, explained_by
 
 from ..analysis.analysed_log import PointingBudget
+from ..analysis.measure import Window
 from ..analysis.own_metric import check_names, text_of
 from ..scenario.objects import as_disturbance
 from ..scenario.options import OPTIONS
@@ -28,7 +29,7 @@ Design = Literal["independent", "latin_hypercube", "sobol", "saltelli"]
 NOT_TO_BE_EXTENDED = ("latin_hypercube", "saltelli")
 """Designs in which every run depends on the number of runs."""
 MOST_RUNS = 10_000_000
-OF_THE_CAMPAIGN = {
+NOT_SETTABLE = {
     "controller": "use laws",
     "seed": "each run has its own, derived from --seed",
     "plant_robot": "vary robot.*",
@@ -91,9 +92,23 @@ class Requirement(StrictModel):
         return bound
 
     @property
+    def window(self) -> Window:
+        """Time window of the metric."""
+        return Window(self.from_s, self.to_s)
+
+    @property
     def sign(self) -> float:
         """1 if a larger metric is worse, -1 if a smaller one is."""
         return 1.0 if self.above is None else -1.0
+
+    def __str__(self) -> str:
+        way = "below" if self.above is None else "above"
+        end = "" if self.to_s is None else f" to {self.to_s:g} s"
+        window = f" from {self.from_s:g} s{end}" if self.from_s or end else ""
+        return (
+            f"{self.metric} {way} {self.bound:g}{window} in {100.0 * self.share:g} % of the cases, "
+            f"with {100.0 * self.confidence:g} % confidence"
+        )
 
     def is_met(self, value: float) -> bool:
         """Return True if a flight's value meets the bound; False for NaN."""
@@ -101,7 +116,7 @@ class Requirement(StrictModel):
 
 
 class Keep(StrictModel):
-    """Data kept of each flight beside its row."""
+    """Data kept of each flight in addition to its row."""
 
     bag: Literal["never", "on_failure", "always"] = "never"
 
@@ -118,7 +133,7 @@ class Study(StrictModel):
     """Content of a campaign's file."""
 
     scenario: dict[str, Any] = Field(default_factory=dict)
-    """Options of `Scenario`, except those of `OF_THE_CAMPAIGN`."""
+    """Options of `Scenario`, except those of `NOT_SETTABLE`."""
     laws: Annotated[list[str], Field(min_length=1)]
     """Each as ``LAW`` or ``LAW=GAINS``."""
     vary: dict[str, Any] = Field(default_factory=dict)
@@ -222,10 +237,6 @@ class Study(StrictModel):
         """Return all keys except the number of runs, as JSON data."""
         content: dict[str, Any] = json.loads(self.model_dump_json(by_alias=True))
         del content["runs"]
-        if not self.metrics:  # as in folders of earlier releases
-            del content["metrics"]
-        if self.pointing == PointingBudget():
-            del content["pointing"]
         return content
 
     def named(self, where: str) -> Study:
@@ -236,7 +247,6 @@ class Study(StrictModel):
 
 
 def _numbers(value: Any) -> Iterator[float]:
-    """Yield the numbers in a distribution."""
     if isinstance(value, float):
         yield value
     elif isinstance(value, (dict, list)):
@@ -250,9 +260,9 @@ def check_option(name: str) -> None:
     Raises:
         ValueError: with the alternative, or with the allowed options.
     """
-    if name in OF_THE_CAMPAIGN:
-        raise ValueError(f"{name} cannot be set: {OF_THE_CAMPAIGN[name]}")
-    allowed = [option for option in Scenario.model_fields if option not in OF_THE_CAMPAIGN]
+    if name in NOT_SETTABLE:
+        raise ValueError(f"{name} cannot be set: {NOT_SETTABLE[name]}")
+    allowed = [option for option in Scenario.model_fields if option not in NOT_SETTABLE]
     if name not in allowed:
         raise ValueError(f"unknown option {short(name)}: {choices(name, allowed)}")
 

@@ -1,12 +1,20 @@
-"""Distributions of variables, defined by their quantile functions."""
+"""Random numbers of variables: quantiles of their distributions, and designs of experiments.
+
+Each uniform number of a design depends only on the campaign's seed, a name and a number: not on the
+process, on the order of the draws, or on other draws.
+"""
 
 from __future__ import annotations
 
 import math
+import warnings
 from abc import abstractmethod
-from functools import cached_property
-from typing import Annotated, Any, ClassVar
+from functools import cached_property, lru_cache
+from hashlib import blake2b
+from typing import Annotated, Any, ClassVar, NamedTuple
 
+import numpy as np
+from numpy.typing import NDArray
 from pydantic import (
     AfterValidator,
     Field,
@@ -36,9 +44,15 @@ def _rising(bounds: list[float]) -> list[float]:
 Bounds = Annotated[list[float], Field(min_length=2, max_length=2), AfterValidator(_rising)]
 Values = Annotated[list[bool | int | float | str], Field(min_length=1, max_length=100_000)]
 
-
 LEAST_SHARE = 2.0**-1000
 """Smallest probability of which a normal quantile is computed."""
+
+BITS = 52
+"""Random bits of a number from `uniform`."""
+SOBOL_BITS = 30
+MOST_DIMENSIONS = 21_201
+_BLOCK = 1024
+"""Points of Sobol's sequence that are computed at a time."""
 
 
 class Distribution(StrictModel):
@@ -77,11 +91,7 @@ class Distribution(StrictModel):
         return nominal + float(drawn) if self.offset else drawn
 
     def at_least(self, factor: float, nominal: float) -> Distribution:
-        """Return the distribution with results of at least ``factor`` times the nominal value.
-
-        Raises:
-            InputError: it has smaller results, and is not normal; a normal one is truncated.
-        """
+        """Return the distribution with results of at least ``factor`` times the nominal value."""
         low = factor if self.relative else (factor - self.offset) * nominal
         return self._truncated(low)
 
@@ -116,8 +126,7 @@ class Normal(Distribution):
         )
         return low, high
 
-    def quantile(self, u: float) -> float:
-        """Return the quantile of probability ``u``."""
+    def quantile(self, u: float) -> float:  # noqa: D102
         low, high = self._probabilities
         share = min(max(low + u * (high - low), LEAST_SHARE), 1.0 - 2.0**-53)
         value = self.normal + self.sigma * quantile(share)
@@ -138,8 +147,7 @@ class Uniform(Distribution):
 
     uniform: Bounds
 
-    def quantile(self, u: float) -> float:
-        """Return the quantile of probability ``u``."""
+    def quantile(self, u: float) -> float:  # noqa: D102
         low, high = self.uniform
         return min(max(low + u * (high - low), low), high)
 
@@ -161,8 +169,7 @@ class LogUniform(Distribution):
         low, high = self.log_uniform
         return log(high / low)
 
-    def quantile(self, u: float) -> float:
-        """Return the quantile of probability ``u``."""
+    def quantile(self, u: float) -> float:  # noqa: D102
         low, high = self.log_uniform
         return min(max(low * exp(u * self._span), low), high)
 
@@ -171,11 +178,7 @@ class Categorical(Distribution):
     """Base class of distributions over a list of numbers or texts."""
 
     is_continuous: ClassVar[bool] = False
-
-    @property
-    @abstractmethod
-    def values(self) -> list[Any]:
-        """The possible values."""
+    values: Values
 
     @property
     def ends(self) -> list[Value]:
@@ -194,48 +197,36 @@ class Categorical(Distribution):
 class Choice(Categorical):
     """A random value of a list, with optional weights (default: equal)."""
 
-    choice: Values
+    values: Annotated[Values, Field(alias="choice")]
     weights: list[Annotated[float, Field(ge=0.0)]] | None = None
 
     @field_validator("weights", mode="after")
     @classmethod
     def _fit(cls, weights: list[float] | None, info: ValidationInfo) -> list[float] | None:
         if weights is not None:
-            if len(weights) != len(info.data.get("choice", weights)):
+            if len(weights) != len(info.data.get("values", weights)):
                 raise ValueError("one weight for each value of choice was expected")
             if not 0.0 < sum(weights) < math.inf:
                 raise ValueError("at least one weight must be above 0")
         return weights
 
-    @property
-    def values(self) -> list[Any]:
-        """Return the possible values."""
-        return self.choice
-
-    def quantile(self, u: float) -> Value:
-        """Return the quantile of probability ``u``."""
-        weights = self.weights or [1.0] * len(self.choice)
+    def quantile(self, u: float) -> Value:  # noqa: D102
+        weights = self.weights or [1.0] * len(self.values)
         left = u * sum(weights)
-        for value, weight in zip(self.choice, weights, strict=True):
+        for value, weight in zip(self.values, weights, strict=True):
             left -= weight
             if left < 0.0:
                 return value
-        return self.choice[-1]
+        return self.values[-1]
 
 
 class Grid(Categorical):
     """Every value of a list in turn."""
 
-    grid: Values
+    values: Annotated[Values, Field(alias="grid")]
 
-    @property
-    def values(self) -> list[Any]:
-        """Return the possible values."""
-        return self.grid
-
-    def quantile(self, u: float) -> Value:
-        """Return the quantile of probability ``u``."""
-        return self.grid[int(u * len(self.grid))]
+    def quantile(self, u: float) -> Value:  # noqa: D102
+        return self.values[int(u * len(self.values))]
 
 
 KINDS: dict[str, type[Distribution]] = {
@@ -249,11 +240,7 @@ KINDS: dict[str, type[Distribution]] = {
 
 
 def read_distribution(value: Any, where: str) -> Distribution:
-    """Read a distribution; a plain number or text is a constant.
-
-    Raises:
-        InputError: invalid distribution; ``where`` names file and key.
-    """
+    """Read a distribution; a plain number or text is a constant."""
     if isinstance(value, (bool, int, float, str)):
         return validate(Choice, {"choice": [value]}, where)
     if isinstance(value, dict):
@@ -266,3 +253,95 @@ def read_distribution(value: Any, where: str) -> Distribution:
         f"{where}: a distribution was expected, a mapping with one of {', '.join(KINDS)}, "
         f"got {short(value)}" + (f" (did you mean {near}?)" if near else "")
     )
+
+
+def bits(seed: int, name: str, number: int) -> int:
+    """Return 64 random bits: the BLAKE2 hash of the arguments."""
+    text = f"{seed}:{number}:{name}".encode()
+    hashed = blake2b(text, digest_size=8, person=b"space_robot").digest()
+    return int.from_bytes(hashed, "little")
+
+
+def uniform(seed: int, name: str, number: int) -> float:
+    """Return a uniform random number in the open interval (0, 1)."""
+    return _unit(bits(seed, name, number) >> (64 - BITS))
+
+
+def _unit(integer: int) -> float:
+    return (integer + 0.5) * 2.0**-BITS
+
+
+def noise_seed(seed: int, number: int) -> int:
+    """Return the 31-bit seed of the noise of sensors and faults in a draw."""
+    return bits(seed, "seed", number) >> 33
+
+
+@lru_cache(maxsize=256)
+def permutation(seed: int, name: str, length: int) -> NDArray[np.int64]:
+    """Return the numbers 0 to ``length`` - 1 in random order."""
+    key = bits(seed, f"{name}:permutation", 0)
+    raw = np.random.Philox(key=key).random_raw(length)  # counter-based: the same bits everywhere
+    return np.argsort(raw, kind="stable")
+
+
+class DesignPoint(NamedTuple):
+    """Position of a run in its design."""
+
+    draw: int
+    """Number of the draw; runs with the same draw differ only in grid values or Saltelli point."""
+    point: int
+    """Number of the grid point, or of the point in a row of Saltelli's design."""
+
+
+class Design(NamedTuple):
+    """Uniform numbers of every random variable (not of grids), by the design of a study.
+
+    A row of Saltelli's design has d + 2 runs: point A, then A with variable 1 from B, ..., with
+    variable d from B, then point B; A and B are taken from one Sobol sequence.
+    """
+
+    name: str
+    seed: int
+    draws: int
+    """Number of draws."""
+    variables: int
+    """Number d of variables."""
+
+    def uniform(self, place: DesignPoint, name: str, number: int) -> float:
+        """Return the uniform number, in (0, 1), of random variable ``number`` for a run."""
+        match self.name:
+            case "independent":
+                return uniform(self.seed, name, place.draw)
+            case "latin_hypercube":  # one number in each of as many strata as there are draws
+                stratum = int(permutation(self.seed, name, self.draws)[place.draw])
+                inside = uniform(self.seed, name, place.draw)
+                return min((stratum + inside) / self.draws, 1.0 - 2.0**-53)
+            case "sobol":
+                return shifted(self.seed, name, place.draw, number)
+        is_b = place.point in (number + 1, self.variables + 1)
+        dimension = number + self.variables * is_b
+        return shifted(self.seed, f"{name}:{'B' if is_b else 'A'}", place.draw, dimension)
+
+
+def shifted(seed: int, name: str, index: int, dimension: int) -> float:
+    """Return a number of Sobol's sequence with a digital shift derived from ``name``."""
+    if dimension >= MOST_DIMENSIONS:
+        raise InputError(f"a Sobol sequence has {MOST_DIMENSIONS} dimensions at most")
+    shift = bits(seed, f"{name}:shift", 0) >> (64 - BITS)
+    # variables share the cache: as many dimensions are computed as the next power of two
+    dimensions = min(max(16, 1 << dimension.bit_length()), MOST_DIMENSIONS)
+    block = _sobol_block(dimensions, index // _BLOCK)
+    return _unit((int(block[index % _BLOCK, dimension]) << (BITS - SOBOL_BITS)) ^ shift)
+
+
+@lru_cache(maxsize=8)
+def _sobol_block(dimensions: int, block: int) -> NDArray[np.int64]:
+    from scipy.stats import qmc  # slow to import
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # SciPy warns unless the number of points is a power of two
+        sequence = qmc.Sobol(dimensions, scramble=False, bits=SOBOL_BITS)
+        if block:
+            sequence.fast_forward(block * _BLOCK)
+        points = sequence.random(_BLOCK)
+    return np.round(points * 2.0**SOBOL_BITS).astype(np.int64)

@@ -13,8 +13,7 @@ from space_robot_msgs_py.errors import InputError
 from ...api import Scenario
 from ...flight.plan import Flight
 from ..study import Law, Study
-from .designs import DESIGNS, Blocks, Design, DesignPoint, Saltelli, noise_seed
-from .distributions import Grid, Value
+from .distributions import Design, DesignPoint, Grid, Value, noise_seed
 from .nominal import Nominal, Variation
 from .paths import Path, value_at
 from .variables import Variable, errors_at, read_variables
@@ -24,24 +23,12 @@ MOST_NOMINALS = 64
 MOST_RUNS_KEPT = 256
 """Size of the cache of drawn values: several laws fly each run, and rows hold the values."""
 
-Drawn = Iterable[tuple[Variable, Value]]
-
 
 class Draws:
     """Random draws of a campaign; each number depends only on seed, run and variable name."""
 
-    def __init__(self, study: Study, seed: int, runs: int, check: bool = True) -> None:
-        """Resolve all variables of the campaign.
-
-        Args:
-            study: the campaign's file.
-            seed: of the campaign.
-            runs: number of runs, counted from 0.
-            check: check that every law can fly the extreme values of each variable.
-
-        Raises:
-            InputError: something cannot be flown or varied; names the key of ``vary``.
-        """
+    def __init__(self, study: Study, seed: int, runs: int) -> None:
+        """Resolve all variables of a campaign with some ``runs``, counted from 0."""
         self.study, self.seed, self.runs = study, seed, runs
         self._nominals: dict[tuple[str, str], Nominal] = {}
         nominals = []
@@ -52,61 +39,51 @@ class Draws:
         self.names = [variable.name for variable in self._variables]
         """Names of all variables, in the file's order."""
         self._grids = {
-            variable.name: variable.distribution.grid
+            variable.name: variable.distribution.values
             for variable in self._variables
             if isinstance(variable.distribution, Grid)
         }
-        self._points = math.prod(map(len, self._grids.values()))
-        self._design = self._made_design()
+        self._points = self._runs_per_draw()
+        self._design = Design(study.design, seed, runs // self._points, len(self.names))
         self._drawn = lru_cache(MOST_RUNS_KEPT)(self._draw)
-        if check:
-            self._check_ends()
 
     @property
     def grid(self) -> dict[str, int]:
         """Number of values of each grid variable, by name."""
         return {name: len(values) for name, values in self._grids.items()}
 
-    @property
-    def blocks(self) -> Blocks | None:
-        """Layout of the runs in Saltelli's design; None for other designs."""
-        if self.study.design != "saltelli":
-            return None
-        return Blocks(self.runs // self._points, self.names)
-
-    @property
-    def needs_all_runs(self) -> bool:
-        """True if the draws depend on the number of runs."""
-        return self._design.needs_all_runs
-
     def values(self, run: int) -> dict[str, float | str]:
         """Return the drawn values of a run by variable name.
 
         They are factors of variables with ``relative``, and differences of those with ``offset``.
         """
-        return {variable.name: _told(value) for variable, value in self._drawn(run)}
+        return {variable.name: _as_cell(value) for variable, value in self._drawn(run)}
 
     def scenario(self, run: int, law: str) -> Scenario:
-        """Return the scenario of a law in a run; the plant's noise is the same for all laws.
-
-        Raises:
-            InputError: there is no such run, or its values cannot be flown together.
-        """
+        """Return the scenario of a law in a run; the plant's noise is the same for all laws."""
         nominal, variation = self._varied(law, self._drawn(run), self._noise_seed(run))
-        return nominal.scenario_of(variation)
+        return nominal.scenario_with(variation)
 
     def flight(self, run: int, law: str) -> Flight:
-        """Return the checked flight of `scenario`; files are read once a law, not once a run.
-
-        Raises:
-            InputError: as there, or it cannot be flown.
-        """
+        """Return the checked flight of `scenario`; files are read once a law, not once a run."""
         nominal, variation = self._varied(law, self._drawn(run), self._noise_seed(run))
-        return nominal.flight_of(variation)
+        return nominal.flight_with(variation)
 
     def nominal(self, law: str) -> Scenario:
         """Return the nominal scenario of a law."""
         return self._nominal(law).scenario
+
+    def check_ends(self) -> None:
+        """Check that every law can fly the extreme values of each variable."""
+        for variable in self._variables:
+            if variable.is_always_consistent:
+                continue
+            where = f"{self.study.where}: vary.{variable.key}: {variable.name} can be"
+            differs_by_law = variable.group in ("controller", "gains")
+            for law in self.study.laws if differs_by_law else self.study.laws[:1]:
+                for value in variable.distribution.ends:
+                    with errors_at(f"{where} {_as_text(value)}"):
+                        self._extreme(law, variable, value).check()
 
     def flights_of_options(self) -> Iterator[tuple[str, Flight]]:
         """Yield a description and the flight of each extreme value of each varied option."""
@@ -114,7 +91,12 @@ class Draws:
             if variable.group == "scenario":
                 for value in variable.distribution.ends:
                     flight = self._extreme(self.study.laws[0], variable, value).check()
-                    yield f"{variable.name}: {_shown(value)}", flight
+                    yield f"{variable.name}: {_as_text(value)}", flight
+
+    def _extreme(self, law: str, variable: Variable, value: Value) -> Scenario:
+        seed = self._nominal(law).scenario.seed
+        nominal, variation = self._varied(law, [(variable, value)], seed)
+        return nominal.scenario_with(variation)
 
     def _place(self, run: int) -> DesignPoint:
         if not 0 <= run < self.runs:
@@ -124,30 +106,25 @@ class Draws:
     def _noise_seed(self, run: int) -> int:
         place = self._place(run)
         # in Saltelli's design noise is one more variable, which is never taken from B alone
-        of_b = isinstance(self._design, Saltelli) and place.point > len(self.names)
-        return noise_seed(self.seed, 2 * place.draw + of_b)
+        is_b = self.study.design == "saltelli" and place.point > len(self.names)
+        return noise_seed(self.seed, 2 * place.draw + is_b)
 
     def _draw(self, run: int) -> list[tuple[Variable, Value]]:
         place = self._place(run)
-        point, on_grid = place.point, {}
+        point, drawn = place.point, dict[str, Value]()
         for name, values in reversed(self._grids.items()):
             point, index = divmod(point, len(values))
-            on_grid[name] = values[index]
+            drawn[name] = values[index]
         numbers = itertools.count()
-        return [
-            (
-                own,
-                on_grid[own.name]
-                if own.name in on_grid
-                else own.distribution.quantile(
-                    self._design.uniform(place, own.name, next(numbers))
-                ),
-            )
-            for own in self._variables
-        ]
+        for variable in self._variables:
+            if variable.name not in self._grids:
+                u = self._design.uniform(place, variable.name, next(numbers))
+                drawn[variable.name] = variable.distribution.quantile(u)
+        return [(variable, drawn[variable.name]) for variable in self._variables]
 
-    def _varied(self, law: str, drawn: Drawn, seed: int) -> tuple[Nominal, Variation]:
-        """Return the nominal flight with drawn options, and what the other values change in it."""
+    def _varied(
+        self, law: str, drawn: Iterable[tuple[Variable, Value]], seed: int
+    ) -> tuple[Nominal, Variation]:
         nominal, options = self._nominal(law), {}
         for variable, value in drawn:
             if variable.group == "scenario":
@@ -165,7 +142,6 @@ class Draws:
         return nominal, nominal.variation(changed, seed)
 
     def _nominal(self, law: str, options: dict[str, Any] | None = None) -> Nominal:
-        """Return the nominal flight of a law with some options drawn."""
         options = options or {}
         key = law, repr(sorted(options.items()))
         if key not in self._nominals:
@@ -177,10 +153,10 @@ class Draws:
             self._nominals[key] = Nominal(Scenario(**merged, controller=controller))
         return self._nominals[key]
 
-    def _made_design(self) -> Design:
-        where, name = self.study.where, self.study.design
-        kind = DESIGNS[name]
-        if kind is Saltelli:
+    def _runs_per_draw(self) -> int:
+        where, points = self.study.where, math.prod(self.grid.values())
+        what = "points of the grid"
+        if self.study.design == "saltelli":
             for variable in self._variables:
                 if not variable.distribution.is_continuous:
                     raise InputError(
@@ -189,42 +165,21 @@ class Draws:
                     )
             if not self.names:
                 raise InputError(f"{where}: design: saltelli needs at least one variable")
-            self._points = len(self.names) + 2
-        if self.runs < 1 or self.runs % self._points:
-            more = self._points * max(1, math.ceil(self.runs / self._points))
-            what = "d + 2 runs of each row" if kind is Saltelli else "points of the grid"
+            points, what = len(self.names) + 2, "d + 2 runs of each row"
+        if self.runs < 1 or self.runs % points:
+            more = points * max(1, math.ceil(self.runs / points))
             raise InputError(
-                f"{where}: runs: a multiple of {self._points}, the {what}, was expected, got "
+                f"{where}: runs: a multiple of {points}, the {what}, was expected, got "
                 f"{self.runs}: try {more}"
             )
-        draws = self.runs // self._points
-        if kind is Saltelli:
-            return Saltelli(self.seed, draws, len(self.names))
-        return kind(self.seed, draws)
-
-    def _check_ends(self) -> None:
-        """Check that the extreme values of each variable can be flown."""
-        for variable in self._variables:
-            if variable.is_always_consistent:
-                continue
-            where = f"{self.study.where}: vary.{variable.key}"
-            of_law = variable.group in ("controller", "gains")
-            for law in self.study.laws if of_law else self.study.laws[:1]:
-                for value in variable.distribution.ends:
-                    with errors_at(f"{where}: {variable.name} can be {_shown(value)}"):
-                        self._extreme(law, variable, value).check()
-
-    def _extreme(self, law: str, variable: Variable, value: Value) -> Scenario:
-        seed = self._nominal(law).scenario.seed
-        nominal, variation = self._varied(law, [(variable, value)], seed)
-        return nominal.scenario_of(variation)
+        return points
 
 
-def _told(value: Value) -> float | str:
+def _as_cell(value: Value) -> float | str:
     if isinstance(value, bool):
         return str(value).lower()
     return value if isinstance(value, str) else float(value)
 
 
-def _shown(value: Value) -> str:
-    return str(_told(value)) if isinstance(value, (str, bool)) else f"{value:g}"
+def _as_text(value: Value) -> str:
+    return str(_as_cell(value)) if isinstance(value, (str, bool)) else f"{value:g}"

@@ -26,7 +26,7 @@ from ...api import Scenario
 from ...flight.plan import Flight
 from ...scenario.faults import KINDS, PROCESS_KINDS
 from ...scenario.resolved import ResolvedScenario
-from ..study import OF_THE_CAMPAIGN
+from ..study import NOT_SETTABLE
 from .paths import Elements, Path, Unavailable, numbered, plain, replaced
 from .robot_numbers import robot_tree, robot_with
 
@@ -47,7 +47,7 @@ INDEPENDENT = frozenset(
     }
 )
 """Parameters of the plant on which nothing else in a scenario depends."""
-OF_ORBIT = frozenset({"orbital_elements", "gravity", "sunlight"})
+ORBIT_PARAMETERS = frozenset({"orbital_elements", "gravity", "sunlight"})
 """Those that a mission assumes to be known, if it depends on the orbit."""
 
 
@@ -66,11 +66,7 @@ class Nominal:
     """The flight of a law without variations."""
 
     def __init__(self, scenario: Scenario) -> None:
-        """Resolve a scenario.
-
-        Raises:
-            InputError: it cannot be flown.
-        """
+        """Resolve a scenario."""
         flight = scenario.check()
         self.scenario, self.resolved = scenario, flight.scenario
         self.names = flight.plant.names
@@ -88,9 +84,7 @@ class Nominal:
                 use = "laws" if name in ("controller", "gains") else f"scenario.{name}"
                 tree[name] = Unavailable(f"{name} applies to the whole flight: use {use}")
         gains = {
-            name: Elements(
-                dict(zip(self.names.axes, row.tolist(), strict=True)), default="together"
-            )
+            name: Elements(dict(zip(self.names.axes, row.tolist(), strict=True)), default="all")
             for name, row in law.gain_values.items()
         }
         return {"robot": robot_tree(robot), "scenario": self._options(), **nodes, "gains": gains}
@@ -101,24 +95,20 @@ class Nominal:
             name: values[name] if type(values.get(name)) in (int, float) else None
             for name in Scenario.model_fields
         }
-        refused = {name: f"{name} cannot be set: {why}" for name, why in OF_THE_CAMPAIGN.items()}
+        refused = {name: f"{name} cannot be set: {why}" for name, why in NOT_SETTABLE.items()}
         refused["gains"] = "gain sets are chosen by laws: [LAW=SET, LAW=OTHER_SET]"
         for name in ("faults", "events", "swaps", "parameters"):
             refused[name] = f"the option {name} has no elements to vary; see faults, plant.*"
         return options | {name: Unavailable(why) for name, why in refused.items()}
 
     def variation(self, values: Mapping[Path, Any], seed: int) -> Variation:
-        """Return the variation with other values in the `tree`.
-
-        Raises:
-            InputError: see `robot_with`.
-        """
+        """Return the variation with other values in the `tree`."""
         faults = list(self.scenario.faults)
-        of_robot: dict[Path, Any] = {}
+        robot_numbers: dict[Path, Any] = {}
         others: dict[Path, Any] = {}
         for path, value in values.items():
             if path[0] == "robot":
-                of_robot[path[1:]] = value
+                robot_numbers[path[1:]] = value
             elif path[0] == "faults":
                 faults.append(path[1].replace("{}", repr(float(value)).removesuffix(".0")))
             else:
@@ -129,10 +119,10 @@ class Nominal:
             controller[self.resolved.law.name] = gains
         robot = self.resolved.robots.plant
         has_surfaces = self.resolved.plant.has_surfaces
-        plant_robot = robot_with(robot, of_robot, has_surfaces) if of_robot else None
+        plant_robot = robot_with(robot, robot_numbers, has_surfaces) if robot_numbers else None
         return Variation(seed, faults, parameters, plant_robot)
 
-    def scenario_of(self, variation: Variation) -> Scenario:
+    def scenario_with(self, variation: Variation) -> Scenario:
         """Return the scenario of a variation."""
         options = {**self.scenario.given, "seed": variation.seed}
         if variation.plant_robot is not None:
@@ -146,36 +136,35 @@ class Nominal:
             options["parameters"] = parameters
         return Scenario(**options)
 
-    def flight_of(self, variation: Variation) -> Flight:
-        """Return the flight of a variation, as `scenario_of` gives it.
-
-        Raises:
-            InputError: it cannot be flown.
-        """
+    def flight_with(self, variation: Variation) -> Flight:
+        """Return the flight of a variation, as `scenario_with` gives it."""
         if (resolved := self._resolved(variation)) is None:
-            return self.scenario_of(variation).check()
+            return self.scenario_with(variation).check()
         flight = Flight(resolved)
         flight.check_in_process()
         return flight
 
     def _resolved(self, variation: Variation) -> ResolvedScenario | None:
-        """Resolve a variation; None if this needs files, or if a number is invalid."""
+        # None if this needs files, or if a number is invalid
         nominal, parameters = self.resolved, dict(variation.parameters)
-        of_plant, gains = parameters.pop("plant", {}), parameters.pop("controller", {})
+        plant_changes, gains = parameters.pop("plant", {}), parameters.pop("controller", {})
         are_gains = all(law in nominal.laws and isinstance(gains[law], dict) for law in gains)
-        if parameters or not are_gains or not of_plant.keys() <= INDEPENDENT:
+        if parameters or not are_gains or not plant_changes.keys() <= INDEPENDENT:
             return None
         # navigation assumes to know the sensors' numbers if they have no file
-        if of_plant.keys() & SensorSettings.model_fields.keys() and nominal.plant.sensors == GIVEN:
+        if (
+            plant_changes.keys() & SensorSettings.model_fields.keys()
+            and nominal.plant.sensors == GIVEN
+        ):
             return None
-        if of_plant.keys() & OF_ORBIT and nominal.reference.uses_orbit:
+        if plant_changes.keys() & ORBIT_PARAMETERS and nominal.reference.uses_orbit:
             return None
         options = nominal.options.model_copy(
             update={"seed": variation.seed, "faults": variation.faults}
         )
-        of_plant["faults"] = options.faults_of(PLANT_KINDS) or [""]
+        plant_changes["faults"] = options.faults_of(PLANT_KINDS) or [""]
         try:
-            plant = _plant(nominal.plant, {**of_plant, "fault_seed": variation.seed})
+            plant = _plant(nominal.plant, {**plant_changes, "fault_seed": variation.seed})
             laws = _laws(nominal, gains)
         except ValueError:
             return None
@@ -193,7 +182,6 @@ class Nominal:
 
 
 def _plant(nominal: PlantNodeSettings, changes: Tree) -> PlantNodeSettings:
-    """Return the plant's settings with changes, each field of which is validated."""
     groups, plain_changes = {}, {}
     for name, value in changes.items():
         now = getattr(nominal, name)
@@ -207,7 +195,7 @@ def _plant(nominal: PlantNodeSettings, changes: Tree) -> PlantNodeSettings:
 
 
 def _laws(nominal: ResolvedScenario, gains: Tree) -> dict[str, ControlLaw]:
-    """Return the laws; those that fly, or have other gains, are copies with their own memory."""
+    # those that fly, or have other gains, are copies with their own memory
     flying = {nominal.law.name, *(law.name for _, law in nominal.swaps)}
     laws = {}
     for name, law in nominal.laws.items():

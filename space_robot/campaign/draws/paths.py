@@ -35,18 +35,14 @@ class Elements(dict[str, Any]):
         Args:
             elements: by name.
             aliases: a further name of each, in the same order.
-            default: what a path without brackets selects: "each", all "together" with one number,
+            default: what a path without brackets selects: "each", "all" with one number,
                 or, if empty, nothing.
         """
         super().__init__(elements)
         self.aliases, self.default = dict(zip(aliases, elements, strict=False)), default
 
     def chosen(self, element: str, where: str) -> list[str]:
-        """Return the names of the elements that brackets select: by name, number from 1, or ``*``.
-
-        Raises:
-            InputError: there is no such element; lists the existing ones.
-        """
+        """Return the names of the elements selected by name, number from 1, or ``*``."""
         names = list(self)
         if element == EACH:
             return names
@@ -77,9 +73,6 @@ def matches(tree: Tree, pattern: str) -> dict[str, list[Path]]:
 
     Returns:
         By the name of each independent number the leaves that get it, in the tree's order.
-
-    Raises:
-        InputError: there are no such leaves; tells the allowed words or elements.
     """
     if not _PATH.fullmatch(pattern):
         raise InputError(f"{short(pattern)} is not a path such as robot.links[*].mass")
@@ -95,7 +88,6 @@ def matches(tree: Tree, pattern: str) -> dict[str, list[Path]]:
 def _step(
     tree: Tree, selected: Mapping[str, list[Path]], word: str, element: str
 ) -> dict[str, list[Path]]:
-    """Follow one step of a pattern, leaving out elements without it if others have it."""
     inner: dict[str, list[Path]] = {}
     refusals = []
     for name, paths in selected.items():
@@ -123,7 +115,7 @@ def _inner(
         if element:
             raise InputError(f"{name} has no elements")
         return {name: paths}
-    if not element and inner.default == "together":
+    if not element and inner.default == "all":
         return {name: [(*path, own) for path in paths for own in inner]}
     if not element and not inner.default:
         raise InputError(f"an element is missing: {name}[*] for each of {', '.join(inner)}")

@@ -55,7 +55,7 @@ def robot_tree(robot: Robot) -> Tree:
         "base": bodies[0],
         "links": Elements(dict(zip(robot.body_names[1:], bodies[1:], strict=True)), joints),
         "joints": Elements({name: _joint(robot, joint) for joint, name in enumerate(joints)}),
-        "plates": Elements(plates, default="together"),
+        "plates": Elements(plates, default="all"),
     }
 
 
@@ -99,15 +99,9 @@ def is_always_consistent(path: Path) -> bool:
 
 
 def robot_with(robot: Robot, numbers: Mapping[Path, float], has_surfaces: bool) -> Robot:
-    """Return a robot with other numbers.
+    """Return a robot with other numbers, by path in its `robot_tree`.
 
-    Args:
-        robot: the nominal one.
-        numbers: by path in a `robot_tree`.
-        has_surfaces: True: the plates derived from the nominal robot's shapes stay as they are.
-
-    Raises:
-        InputError: its plates reflect more light than falls on them.
+    ``has_surfaces``: the plates derived from the nominal robot's shapes stay as they are.
     """
     mass, inertia, com = robot.mass.copy(), robot.inertia.copy(), robot.com.copy()
     friction, springs, gears = list(robot.friction), list(robot.springs), list(robot.gears)
@@ -173,7 +167,7 @@ def _check_shares(plates: Sequence[Plate]) -> None:
 
 
 def _with_base_moved(robot: Robot, shift: Array) -> Robot:
-    """Shift everything on the base by ``shift``: the base's frame stays at its CoM."""
+    # everything on the base moves: the base's frame stays at its CoM
     offset, com = robot.offset.copy(), robot.com.copy()
     com[0] = 0.0
     for joint in np.flatnonzero(robot.parent == 0):

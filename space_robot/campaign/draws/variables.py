@@ -71,14 +71,9 @@ def errors_at(where: str) -> Iterator[None]:
 
 
 def read_variables(study: Study, nominals: Sequence[Nominal]) -> list[Variable]:
-    """Return all variables, in the file's order; ``[*]`` gives one variable for each element.
+    """Return all variables, in the file's order, with the nominal flight of each law.
 
-    Args:
-        study: the file.
-        nominals: the nominal flight of each law.
-
-    Raises:
-        InputError: names the key of ``vary`` that is wrong.
+    ``[*]`` gives one variable for each element.
     """
     gains = {gain: own for nominal in nominals[::-1] for gain, own in nominal.tree["gains"].items()}
     tree = {**nominals[0].tree, "gains": gains, FAULTS: {}}
@@ -160,7 +155,6 @@ def _all_faults(value: Any, where: str, names: RobotNames) -> Iterator[Variable]
 
 
 def _faults(key: str, distribution: Distribution, names: RobotNames) -> Iterator[Variable]:
-    """Yield the variables of a fault: its text without the last number, or with ``T`` as time."""
     kinds, name = PLANT_KINDS, key.partition("@")[0]
     kind = kinds[one_of(name, kinds, "kind of fault", listing="--fault list")]
     if distribution.relative or distribution.offset:

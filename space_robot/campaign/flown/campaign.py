@@ -16,6 +16,7 @@ import yaml
 
 from space_robot_msgs_py.config.arguments import as_path, as_positive, as_whole_number
 from space_robot_msgs_py.config.installation import install_command
+from space_robot_msgs_py.config.text import html_table
 from space_robot_msgs_py.config.validation import short, validate
 from space_robot_msgs_py.config.yaml_text import read_file
 from space_robot_msgs_py.errors import InputError
@@ -24,13 +25,11 @@ from ...analysis.own_metric import SESSION, MetricFunction, check_names, text_of
 from ...console.progress import check_progress, rated_progress
 from ...processes.executor import check_scheduler, cores, is_daemonic, start_fork_server
 from ...processes.scratch_folder import ScratchFolder
-from ..store.store import DATABASE, begin_or_resume, held_store
 from ..study import Study, read_study
-from .bags import fly_bags
-from .campaign_html import study_html
-from .flights import Flights, Progress
+from .flights import Flights, Progress, fly_bags
 from .flown_campaign import FlownCampaign
 from .preparation import Preparation
+from .store import DATABASE, begin_or_resume, held_store
 
 
 class Campaign:
@@ -44,7 +43,7 @@ class Campaign:
         Args:
             study: content of a campaign's file.
             metrics: functions of the log of a flight, by the name of the metric that each returns,
-                or their names as in a file; beside those of the study.
+                or their names as in a file; in addition to those of the study.
 
         Raises:
             InputError: ``study`` is not a `Study`, or a metric is no function.
@@ -54,7 +53,7 @@ class Campaign:
                 f"study: a Study was expected, got {short(study)}; "
                 "Campaign.load reads a file, Campaign.of a mapping"
             )
-        self.study = with_metrics(study, metrics or {})
+        self.study = _with_metrics(study, metrics or {})
         self._text = ""
 
     @classmethod
@@ -63,9 +62,7 @@ class Campaign:
     ) -> Campaign:
         """Read a campaign's file, by its path or by a name of ``config/campaigns``.
 
-        Args:
-            path: of the file.
-            metrics: beside those of the file, see `Campaign`.
+        ``metrics``: in addition to those of the file, see `Campaign`.
 
         Raises:
             InputError: in one line, naming file and key.
@@ -81,15 +78,13 @@ class Campaign:
     ) -> Campaign:
         """Build a campaign from the content of a file: ``{"laws": ["ctc"], "vary": {...}}``.
 
-        Args:
-            content: of a file.
-            metrics: beside those of the content, see `Campaign`.
+        ``metrics``: in addition to those of the content, see `Campaign`.
 
         Raises:
             InputError: in one line, naming the key.
         """
-        is_mapping = isinstance(content, Mapping)
-        return cls(validate(Study, dict(content) if is_mapping else content, "campaign"), metrics)
+        plain = dict(content) if isinstance(content, Mapping) else content
+        return cls(validate(Study, plain, "campaign"), metrics)
 
     def run(
         self,
@@ -125,12 +120,16 @@ class Campaign:
             InputError: something cannot be flown; the folder is another campaign's; disk full; a
                 metric's function fails, or cannot be sent to the workers or kept in a folder.
         """
-        _check_pandas()
+        try:
+            import pandas  # noqa: F401
+        except ImportError:
+            command = install_command("campaign")
+            raise InputError(f"a campaign's table needs pandas: {command}") from None
         check_progress(progress)
         if local := [n for n, text in self.study.metrics.items() if text.startswith(SESSION)]:
-            check_local(local, out, workers, scheduler)
+            _check_local(local, out, workers, scheduler)
             workers = 0
-            warn(f"metrics {', '.join(local)}: {OF_SESSION}: this process flies alone")
+            warn(f"metrics {', '.join(local)}: {SESSION_ONLY}: this process flies alone")
         prepared = Preparation.of(self.study, seed, runs)
         usual = 0 if is_daemonic() else cores()
         processes = usual if workers is None else as_whole_number(workers, "workers", 0)
@@ -152,7 +151,7 @@ class Campaign:
                 prepared.compile(is_in_lanes=timeout_s is None)
                 prepared.try_metrics(processes, timeout_s if processes else None)
         with held_store(folder) as store:
-            if changes := begin_or_resume(store, manifest, self._text or as_yaml(self.study)):
+            if changes := begin_or_resume(store, manifest, self._text or _as_yaml(self.study)):
                 warn(changes)
             flights = Flights(prepared.flyer, prepared.runs, store)
             if not flights.are_complete:
@@ -167,15 +166,22 @@ class Campaign:
         return FlownCampaign(folder, True, temporary, flights.kept)
 
     def _repr_html_(self) -> str:
-        """Show flights, variables and requirements in a notebook."""
-        return study_html(self.study)
+        study = self.study
+        runs = study.runs or (study.until and study.until.runs)
+        flights = f", {runs} runs, {runs * len(study.laws)} flights" if runs else ""
+        caption = f"{study.where}: {', '.join(study.laws)}{flights}"
+        demands = {name: str(demand) for name, demand in study.require.items()}
+        return (
+            html_table(("option", "value"), _pairs(study.scenario), caption)
+            + html_table(("variable", "distribution"), _pairs(study.vary))
+            + html_table(("requirement", "demand"), _pairs(demands))
+        )
 
 
 @contextmanager
 def _shown(
     progress: Callable[[Progress], object] | bool | None,
 ) -> Iterator[Callable[[Progress], object]]:
-    """Yield the function that is called with the progress: the user's, or that of a line."""
     if progress is not True:
         yield progress or (lambda _: None)
         return
@@ -183,41 +189,22 @@ def _shown(
         yield lambda p: show(p.done, p.total, f"{p.failed} failed" if p.failed else "")
 
 
-def _check_pandas() -> None:
-    try:
-        import pandas  # noqa: F401
-    except ImportError:
-        raise InputError(
-            f"a campaign's table needs pandas: {install_command('campaign')}"
-        ) from None
+SESSION_ONLY = "of this Python session (a notebook's or script's function, or a lambda)"
 
 
-OF_SESSION = "of this Python session (a notebook's or script's function, or a lambda)"
-
-
-def check_local(
+def _check_local(
     names: Sequence[str], out: str | Path | None, workers: int | None, scheduler: str | None
 ) -> None:
-    """Check that a campaign needs the metrics of this session in this process only.
-
-    Raises:
-        InputError: other processes or a folder would need them; says what to do.
-    """
     if workers or scheduler is not None or out is not None:
         option = "out" if out is not None else "scheduler" if scheduler is not None else "workers"
         raise InputError(
-            f"{option}: metrics {', '.join(names)} are {OF_SESSION}, which no other process can "
+            f"{option}: metrics {', '.join(names)} are {SESSION_ONLY}, which no other process can "
             f"import: put them into a file, mine.py, and name them as 'mine.py:{names[0]}', or "
             "leave out, workers and scheduler away"
         )
 
 
-def with_metrics(study: Study, metrics: Mapping[str, MetricFunction | str]) -> Study:
-    """Return a study with further metrics.
-
-    Raises:
-        InputError: a name is taken or invalid, or a metric is no function.
-    """
+def _with_metrics(study: Study, metrics: Mapping[str, MetricFunction | str]) -> Study:
     for name, function in metrics.items():
         if name in study.metrics:
             raise InputError(f"{study.where}: metrics: {name} is defined twice")
@@ -226,7 +213,12 @@ def with_metrics(study: Study, metrics: Mapping[str, MetricFunction | str]) -> S
     return study
 
 
-def as_yaml(study: Study) -> str:
-    """Return the text of a campaign's file of a study."""
+def _as_yaml(study: Study) -> str:
     content = study.model_dump(by_alias=True, exclude_defaults=True)
     return yaml.safe_dump(content, sort_keys=False, allow_unicode=True)
+
+
+def _pairs(content: Mapping[str, Any]) -> Iterator[list[str]]:
+    for name, value in content.items():
+        text = yaml.safe_dump(value, default_flow_style=True, width=10**9, allow_unicode=True)
+        yield [name, value if isinstance(value, str) else text.partition("\n")[0]]

@@ -18,6 +18,7 @@ from space_robot_control.laws.names import (
 )
 from space_robot_msgs_py.config.arguments import as_path, as_whole_number
 from space_robot_msgs_py.config.installation import install_command
+from space_robot_msgs_py.config.text import html_table
 from space_robot_msgs_py.config.validation import one_of, validate
 from space_robot_msgs_py.errors import InputError
 
@@ -26,13 +27,11 @@ from ...api.flown_flight import fly_in_process
 from ...console.files import atomic_file, write_text
 from ..row.fly import RowFlyer
 from ..row.row import Task
-from ..store.manifest import Manifest
-from ..store.software import software, texts_of
-from ..store.store import DATABASE, STUDY, open_store, study_changes
 from ..study import Law, Study
 from ..verdicts.requirements import Verdict, verdicts
-from .campaign_html import verdicts_html
-from .precision import Precision
+from .flights import Precision
+from .manifest import Manifest, all_texts, software
+from .store import DATABASE, STUDY, open_store, study_changes
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -48,16 +47,9 @@ class FlownCampaign:
         temporary: TemporaryDirectory[str] | None = None,
         kept: int = 0,
     ) -> None:
-        """Read the manifest.
+        """Read the manifest, see `open`; a ``temporary`` folder is deleted with this object.
 
-        Args:
-            folder: of the campaign.
-            trust: see `open`.
-            temporary: the folder, if it is to be deleted with this object.
-            kept: number of flights that existed when the campaign was resumed.
-
-        Raises:
-            InputError: it is not a campaign folder, or its store is damaged.
+        ``kept``: number of flights that existed when the campaign was resumed.
         """
         self.folder, self.kept, self._trust, self._temporary = folder, kept, trust, temporary
         with open_store(folder) as store:
@@ -142,11 +134,7 @@ class FlownCampaign:
         return verdicts(self.table, self.study, self.runs, list(self.manifest.table.grid))
 
     def scenario(self, run: int, law: str | None = None) -> Scenario:
-        """Return the scenario of a run, with its draws.
-
-        Args:
-            run: number of the run.
-            law: as in the campaign's file; None: its first law.
+        """Return the scenario of a run, with its draws, under a law (None: the first).
 
         Raises:
             InputError: there is no such law, or the draws cannot be flown.
@@ -162,16 +150,13 @@ class FlownCampaign:
 
             found.scenario(3).bench() ... found.row_of(bench.flown(), run=3, law="by hand")
 
-        Args:
-            flight: with its log, such as one of `scenario` flown on a bench.
-            run: number of the run whose draws it flew.
-            law: its name in the column ``law``.
+        ``run`` is the one whose draws it flew, ``law`` its name in that column.
 
         Raises:
             InputError: the flight has no log or other columns, or a metric's function fails.
         """
         columns, run = self.manifest.table, as_whole_number(run, "run", 0, self.runs - 1)
-        row = self._flyer.row_of_log(Task(run, law), flight.flight, flight.ending, flight.log)
+        row = self._flyer.measured_row(Task(run, law), flight.flight, flight.ending, flight.log)
         if other := sorted(set(row.metrics) - set(columns.metrics)):
             raise InputError(f"the flight has {other[0]}, which is no column of {self.folder}")
         return columns.table([row])
@@ -183,14 +168,8 @@ class FlownCampaign:
     def rerun(self, run: int, law: str | None = None, bag: str | Path | None = None) -> Rerun:
         """Fly a row's flight again, bit for bit, and return its complete log.
 
-        Args:
-            run: number of the run.
-            law: as in the campaign's file; None: its first law.
-            bag: folder to record to, which must not exist.
-
-        Raises:
-            InputError: there is no such row, or its draws cannot be flown.
-            NotTrustedError: an untrusted campaign refers to a module or a file, see `open`.
+        ``law`` None: the file's first; ``bag``: folder to record to, which must not exist. Errors
+        are those of `scenario`, and there may be no such row.
         """
         if not self._trust:
             check_study(self.study)
@@ -202,7 +181,7 @@ class FlownCampaign:
         flyer = self._flyer
         flight = flyer.draws.scenario(task.run, task.law).check()
         flown = fly_in_process(flight, None if bag is None else Path(bag))
-        row = flyer.row_of_log(task, flight, flown.ending, flown.log)
+        row = flyer.measured_row(task, flight, flown.ending, flown.log)
         return Rerun(
             flown,
             task,
@@ -220,8 +199,20 @@ class FlownCampaign:
         return f"<FlownCampaign: {self.folder}, {len(self.table)} flights of {laws}>"
 
     def _repr_html_(self) -> str:
-        """Show the verdicts in a notebook."""
-        return verdicts_html(repr(self)[1:-1], self.verdicts)
+        heads = ("requirement", "law", "point", "verdict", "met", "at least", "at most")
+        rows = [
+            [
+                verdict.requirement,
+                verdict.law,
+                verdict.point,
+                verdict.word,
+                f"{verdict.met} of {verdict.runs}",
+                f"{verdict.limits.low:.4f}",
+                f"{verdict.limits.high:.4f}",
+            ]
+            for verdict in self.verdicts
+        ]
+        return html_table(heads, rows, repr(self)[1:-1])
 
 
 CAMPAIGN = "campaign"
@@ -238,7 +229,7 @@ def check_study(study: Study) -> None:
     for name in (*named, *filter(None, [controller.get("controller")])):
         require_shipped_law(str(name), CAMPAIGN)
     laws = [Law.parse(law).gains for law in study.laws]
-    for text in texts_of([laws, study.scenario, study.vary]):
+    for text in all_texts([laws, study.scenario, study.vary]):
         require_shipped_file("value of an option", text, CAMPAIGN)
     if study.metrics:
         raise NotTrustedError(
@@ -267,14 +258,9 @@ class Rerun(FlownFlight):
         digest_of_row: str,
         other_software: Sequence[str],
     ) -> None:
-        """Store the flight, its task, its digest and that of the row.
+        """Store a flight with its digest, that of its row (empty: not flown), and differences.
 
-        Args:
-            flown: with its log.
-            task: run and law.
-            digest: of this flight.
-            digest_of_row: from the table; empty if the row's flight was not flown.
-            other_software: differences from the software that flew the campaign.
+        ``other_software``: differences from the software that flew the campaign.
         """
         super().__init__(flown.flight, flown.ending, flown.bag, flown.log)
         self.task, self.digest, self.digest_of_row = task, digest, digest_of_row

@@ -19,9 +19,9 @@ from ...processes.executor import run_many
 from ...processes.software import commit
 from ..row.fly import RowFlyer
 from ..row.measure import check_requirements, planned, row_columns, row_metrics
-from ..store.manifest import Columns, Manifest
-from ..store.software import file_digests, flight_digest, software
+from ..row.row import Columns
 from ..study import Study
+from .manifest import Manifest, file_digests, flight_digest, software
 
 ACTUATORS = "actuators"
 """End of the name of a variable that selects the base's actuators."""
@@ -37,12 +37,7 @@ class Preparation:
 
     @classmethod
     def of(cls, study: Study, seed: int, runs: int | None) -> Preparation:
-        """Check seed and number of runs; ``runs`` None: from the file.
-
-        Raises:
-            InputError: the number of runs is missing, or one of them is no whole number, or too
-                small.
-        """
+        """Check seed and number of runs; ``runs`` None: from the file."""
         as_whole_number(seed, "seed", 0)
         if runs is not None:
             as_whole_number(runs, "runs", 1)
@@ -56,24 +51,23 @@ class Preparation:
 
     @cached_property
     def flights(self) -> dict[str, Flight]:
-        """The nominal flight of each law.
-
-        Raises:
-            InputError: one of them cannot be flown.
-        """
+        """The nominal flight of each law."""
         draws = self.flyer.draws
+        draws.check_ends()
         return {law: draws.nominal(law).check() for law in self.study.laws}
 
     @cached_property
     def manifest(self) -> Manifest:
-        """Manifest of the campaign's folder.
-
-        Raises:
-            InputError: something cannot be flown, or a required metric does not exist.
-        """
+        """Manifest of the campaign's folder."""
         where, own, budget = self.study.where, self.study.metrics, self.study.pointing
-        for flight in self.flights.values():
-            self._check_metrics(flight)
+        flights = self.flights.values()  # before metrics: what is wrong with a law is said first
+        try:  # they have columns of their own
+            check_names(own)
+            for text in own.values():
+                function_of(text)
+        except InputError as error:
+            raise InputError(f"{where}: metrics: {error}") from None
+        for flight in flights:
             check_requirements(flight, self.study.require, where, own=own, budget=budget)
         if self.study.require:
             for option, flight in self.flyer.draws.flights_of_options():
@@ -99,14 +93,8 @@ class Preparation:
     def try_metrics(self, workers: int, timeout_s: float | None) -> None:
         """Fly the nominal flight of the first law, and evaluate the user's own metrics of it.
 
-        A flight that ends early has no metrics, and is left to its rows.
-
-        Args:
-            workers: 0: in this process, which a function may hold or end; else in a worker.
-            timeout_s: longest time of a worker, s; None: any.
-
-        Raises:
-            InputError: a function raised an error, returned no finite number or did not return.
+        A flight that ends early has no metrics, and is left to its rows. It flies in a worker if
+        there are some, since a function may hold or end its process.
         """
         law, where = self.study.laws[0], self.study.where
         tried = run_many(self._measure_nominal, [law], workers=min(workers, 1), timeout_s=timeout_s)
@@ -135,28 +123,13 @@ class Preparation:
     def compile(self, is_in_lanes: bool) -> None:
         """Compile the kernels once, before several processes need them.
 
-        Args:
-            is_in_lanes: flights may fly eight at a time; only if those of some law can, its kernels
-                are compiled.
+        ``is_in_lanes``: flights may fly eight at a time; kernels for it are compiled if any can.
         """
         has_hardware = any(flight.plant.names.actuators for flight in self.flights.values())
         is_varied = any(name.endswith(ACTUATORS) for name in self.flyer.draws.names)
         compile_kernels(has_hardware or is_varied)
         if is_in_lanes and not all(map(batch_obstacle, self.flights.values())):
             compile_lanes()
-
-    def _check_metrics(self, flight: Flight) -> None:
-        """Check names and functions of the user's own metrics, which have columns of their own.
-
-        Raises:
-            InputError: a name is taken, or a function cannot be imported.
-        """
-        try:
-            check_names(self.study.metrics)
-            for text in self.study.metrics.values():
-                function_of(text)
-        except InputError as error:
-            raise InputError(f"{self.study.where}: metrics: {error}") from None
 
     def _columns(self) -> Columns:
         nominal = next(iter(self.flights.values()))

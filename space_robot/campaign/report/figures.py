@@ -116,11 +116,7 @@ def grid_figure(
 ) -> Figure:
     """Draw every metric at every point of a grid: medians, with bars from 5 % to 95 % of the runs.
 
-    Args:
-        points: of the grid.
-        laws: of the campaign.
-        metrics: one panel each.
-        names: of the grid's variables.
+    There is a panel per metric; ``names`` are those of the grid's variables.
     """
     figure = page(24.0 + 42.0 * len(metrics))
     panels = figure.subplots(len(metrics), 1, sharex=True, squeeze=False)[:, 0]
@@ -162,10 +158,7 @@ def bands(rows: DataFrame, series: str) -> Array:
     """Compute the quantiles `SHARES` and the maximum of a series at every time, (4, bins).
 
     A failed flight counts as infinite from its end on; the maximum is that of the other flights.
-
-    Args:
-        rows: of one law, at one point of the grid.
-        series: a name of `series_in`.
+    The rows are those of one law at one point of the grid.
     """
     curves = [np.asarray(b, np.float64) for b in rows[f"band.{series}"] if np.ndim(b)]
     table = np.full((len(rows), max(map(len, curves), default=0)), np.inf)
@@ -182,14 +175,7 @@ def bands(rows: DataFrame, series: str) -> Array:
 def band_figure(
     points: Sequence[GridPoint], laws: Sequence[str], series: str, time_s: float
 ) -> Figure:
-    """Draw a series over time: one panel per law, or per grid point if there is a grid.
-
-    Args:
-        points: of the grid; one if there is no grid.
-        laws: of the campaign.
-        series: a name of `series_in`.
-        time_s: duration of all bins, s.
-    """
+    """Draw a series over the time of all bins: a panel per law, or per grid point of several."""
     shown, per_law = points[:MOST_PANELS], len(points) == 1
     curves = {
         (number, law): values
@@ -232,7 +218,6 @@ def band_figure(
 
 
 def _panels(titles: Sequence[str], xlabel: str, ylabel: str) -> tuple[Figure, list[Axes]]:
-    """Return a page of panels with common axes, in up to three columns."""
     count = len(titles)
     columns = 2 if count in (2, 4) else min(3, count)
     figure = page(16.0 + 42.0 * -(-count // columns))
@@ -247,7 +232,7 @@ def _panels(titles: Sequence[str], xlabel: str, ylabel: str) -> tuple[Figure, li
 
 
 def _scale(axes: Axes, curves: Sequence[Array]) -> None:
-    """Make the common vertical axis logarithmic, starting at the minimum of the 5 % curves."""
+    # the common vertical axis is logarithmic, and starts at the minimum of the 5 % curves
     axes.set_yscale("log", nonpositive="mask")
     low, high, worst = (
         np.concatenate([v[k][np.isfinite(v[k]) & (v[k] > 0.0)] for v in curves]) for k in (0, 2, 3)
@@ -261,7 +246,6 @@ def _scale(axes: Axes, curves: Sequence[Array]) -> None:
 
 
 def _number_log_axis(axes: Axes, name: str) -> None:
-    """Label the logarithmic axis ``x`` or ``y`` without overlaps."""
     axis = {"x": axes.xaxis, "y": axes.yaxis}[name]
     low, high = axis.get_view_interval()
     if 0.0 < low < high and log10(high / low) < NARROW:
@@ -274,13 +258,7 @@ def _number_log_axis(axes: Axes, name: str) -> None:
 def distribution_figure(
     points: Sequence[GridPoint], laws: Sequence[str], quantity: Quantity
 ) -> Figure:
-    """Draw the cumulative distribution, and without a grid also its complement.
-
-    Args:
-        points: of the grid; one if there is no grid.
-        laws: of the campaign.
-        quantity: to be drawn, with its limit if it has one.
-    """
+    """Draw the cumulative distribution with its limit, and without a grid also its complement."""
     if len(points) > 1:
         shown = points[:MOST_PANELS]
         titles = [point.point for point in shown]
@@ -305,7 +283,6 @@ def distribution_figure(
 def _draw_distributions(
     axes: Axes, table: DataFrame, laws: Sequence[str], quantity: Quantity, above: bool = False
 ) -> None:
-    """Draw the curve of each law; with failed flights it does not reach 1 (or 0)."""
     for law in laws_in(table):
         index, values = laws.index(law), np.sort(penalised(law_rows(table, law), quantity.column))
         known = values[np.isfinite(values) & (values > 0.0)]
@@ -340,9 +317,6 @@ def influence_figure(influences: Mapping[str, Mapping[str, Any]]) -> Figure:
 
     Bars show the share of the spread that a variable explains by itself, points its rank
     correlation (the partial one where it exists) with the confidence interval.
-
-    Args:
-        influences: by law and variable.
     """
     figure, panels, names = _variable_panels(influences, lambda influence: influence.strength)
     for axes, by_name in zip(panels, influences.values(), strict=False):
@@ -377,7 +351,6 @@ def sobol_figure(indices: Mapping[str, Mapping[str, Any]]) -> Figure:
 def _variable_panels(
     by_law: Mapping[str, Mapping[str, Any]], strength: Callable[[Any], float]
 ) -> tuple[Figure, Sequence[Axes], list[str]]:
-    """Return a panel per law, and the strongest variables, which label the vertical axis."""
     shown = list(by_law)[:MOST_LAWS]
     strongest: dict[str, float] = {}
     for law in shown:
@@ -395,7 +368,6 @@ def _variable_panels(
 
 
 def _shortened(name: str) -> str:
-    """Shorten a long name in its middle: both ends distinguish it from others."""
     half = (LONGEST - 1) // 2
     return name if len(name) <= LONGEST else f"{name[:half]}…{name[-half:]}"
 

@@ -17,9 +17,9 @@ from space_robot_msgs_py.errors import InputError
 
 from ...analysis.measure import Window, describe, label
 from ..flown import FlownCampaign
+from ..flown.flights import is_narrow
 from ..flown.flown_campaign import needs_trust
-from ..flown.precision import is_narrow
-from ..store.manifest import differences
+from ..flown.manifest import differences
 from ..study import Requirement, Study, short_names
 from ..verdicts.influences import Sensitivity, SobolIndices, sensitivity, sobol_indices
 from ..verdicts.laws import League, league
@@ -113,16 +113,7 @@ class Findings:
     def of(
         cls, campaign: FlownCampaign, study: Study | None = None, compared: Sequence[str] = ()
     ) -> Self:
-        """Read all rows that have been flown.
-
-        Args:
-            campaign: the flown campaign.
-            study: with the requirements to judge by (None: the study that was flown).
-            compared: names of the metrics to compare laws by; empty: the default ones.
-
-        Raises:
-            InputError: the table cannot be read, is empty, or lacks a metric that is named.
-        """
+        """Read all rows that have been flown; ``study``: requirements to judge by instead."""
         manifest = campaign.manifest
         warnings: list[str] = []
         table = campaign.table
@@ -149,11 +140,7 @@ class Findings:
         )
 
     def __post_init__(self) -> None:
-        """Choose the metrics.
-
-        Raises:
-            InputError: there is no such metric.
-        """
+        """Choose the metrics."""
         self.laws = laws_in(self.table)
         self.names = short_names(self.laws)
         """Name of each law in tables."""
@@ -262,14 +249,7 @@ class Findings:
     def worst(
         self, point: GridPoint, quantity: Quantity, count: int = WORST, law: str = ""
     ) -> DataFrame:
-        """Return the worst rows: failed flights, the earliest first, then by value.
-
-        Args:
-            point: of the grid.
-            quantity: to sort by.
-            count: maximum number of rows.
-            law: rows of this law only; empty: of all.
-        """
+        """Return the worst rows of a law (empty: of all): failed flights first, then by value."""
         rows = law_rows(point.table, law) if law else point.table
         times = rows["ended_at_s"].to_numpy(np.float64, na_value=0.0)
         values = penalised(rows, quantity.column, quantity.sign)
@@ -285,7 +265,6 @@ class Findings:
 
     @property
     def _is_precise(self) -> bool:
-        """Return True if the campaign stopped at the precision required by its file."""
         require, until = self.study.require, self.study.until
         return until is not None and all(
             is_narrow(require[v.requirement], v.runs - v.met, v.runs, until.half_width)
@@ -323,17 +302,7 @@ class Findings:
 
 
 def rejudged(study: Study, table: DataFrame, flown: Study) -> DataFrame:
-    """Return the table with the requirements of another study.
-
-    Args:
-        study: with the new requirements.
-        table: of the campaign.
-        flown: the study that was flown.
-
-    Raises:
-        InputError: the study has other flights, or requires a metric in a window that the rows do
-            not have.
-    """
+    """Return the table with the requirements of another study than the one that was flown."""
 
     def check_same(key: str, then: Any, now: Any) -> None:
         if now != then:
@@ -345,10 +314,10 @@ def rejudged(study: Study, table: DataFrame, flown: Study) -> DataFrame:
             check_same(key, then, now)
     for name, function in study.metrics.items():
         check_same(f"metrics.{name}", flown.metrics.get(name), function)
-    known = {_windowed(demand): f"require.{name}" for name, demand in flown.require.items()}
+    known = {(d.metric, d.window): f"require.{name}" for name, d in flown.require.items()}
     columns = {}
     for name, demand in study.require.items():
-        metric, window = _windowed(demand)
+        metric, window = demand.metric, demand.window
         column = known.get((metric, window), f"metric.{metric}" if window == Window() else "")
         if column not in table:
             windows = (
@@ -362,7 +331,3 @@ def rejudged(study: Study, table: DataFrame, flown: Study) -> DataFrame:
         columns[f"require.{name}"] = table[column]
     others = [column for column in table if not str(column).startswith("require.")]
     return table[others].assign(**columns)
-
-
-def _windowed(demand: Requirement) -> tuple[str, Window]:
-    return demand.metric, Window(demand.from_s, demand.to_s)

@@ -1,8 +1,9 @@
-"""Flies runs of a campaign in this process, one or several together, and returns their rows."""
+"""Flies runs of a campaign in this process, one or several in lanes, and returns their rows."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import lru_cache
 
@@ -41,31 +42,23 @@ class RowFlyer:
     @property
     def study(self) -> Study:
         """The campaign's study."""
-        return _loaded(self)[0]
+        return self.draws.study
 
     @property
     def draws(self) -> Draws:
-        """The campaign's draws, computed once per process.
-
-        Raises:
-            InputError: an unknown variable; names its key.
-        """
-        return _loaded(self)[1]
+        """The campaign's draws, resolved once per process; their ends have not been checked."""
+        return _resolved_draws(self)
 
     def __call__(self, task: Task) -> Row:
-        """Fly a task and return its row, also after an error.
-
-        Args:
-            task: run and law.
-        """
+        """Fly a task and return its row, also after an error."""
         vary: dict[str, Value] = {}
         try:
             vary = self.draws.values(task.run)
-            return self.row_of(task, self.draws.flight(task.run, task.law))
+            return self.flown_row(task, self.draws.flight(task.run, task.law))
         except Exception as error:  # a defect of this package must not end a campaign either
             return _unflown(task, vary, error)
 
-    def together(self, tasks: Sequence[Task]) -> list[Row]:
+    def fly_batch(self, tasks: Sequence[Task]) -> list[Row]:
         """Fly tasks and return their rows, in any order.
 
         Those that can share a batch fly in lanes; each row is the one of the task alone.
@@ -81,25 +74,23 @@ class RowFlyer:
                 rows.append(_unflown(task, self.draws.values(task.run), error))
         for group in batches(enumerate(flights)):
             numbers = [number for number, _ in group]
-            if len(group) == 1:
-                rows += [self(flown[k]) for k in numbers]
-                continue
-            try:
-                rows += self._rows_of([flown[k] for k in numbers], [flights[k] for k in numbers])
-            except Exception:  # of one of them, which tells it by itself
-                rows += [self(flown[k]) for k in numbers]
+            if len(group) > 1:
+                with suppress(Exception):  # of one of them, whose own row says it
+                    sharing = [flights[k] for k in numbers]
+                    rows += self._rows_in_lanes([flown[k] for k in numbers], sharing)
+                    continue
+            rows += [self(flown[k]) for k in numbers]
         return rows
 
-    def _rows_of(self, tasks: Sequence[Task], flights: Sequence[Flight]) -> list[Row]:
-        """Fly flights that can share a batch."""
-        is_brief = not self.study.metrics and needs_truth_only(self.study.require.values())
-        batch = FlightBatch(flights).fly(is_brief=is_brief)
+    def _rows_in_lanes(self, tasks: Sequence[Task], flights: Sequence[Flight]) -> list[Row]:
+        study = self.study
+        is_brief = not study.metrics and needs_truth_only(flights, study.require.values())
         return [
-            self.row_of_log(tasks[flown.flight], flights[flown.flight], flown.ending, flown.log)
-            for flown in batch
+            self.measured_row(tasks[flown.flight], flights[flown.flight], flown.ending, flown.log)
+            for flown in FlightBatch(flights).fly(is_brief=is_brief)
         ]
 
-    def row_of(self, task: Task, flight: Flight) -> Row:
+    def flown_row(self, task: Task, flight: Flight) -> Row:
         """Fly a flight and return its row."""
         try:
             log, ending = simulate(flight), Ending.complete(flight.ticks, flight.period)
@@ -107,52 +98,43 @@ class RowFlyer:
             if error.log is None:
                 raise
             log, ending = error.log, Ending.early(error, flight.period)
-        return self.row_of_log(task, flight, ending, log)
+        return self.measured_row(task, flight, ending, log)
 
-    def row_of_log(self, task: Task, flight: Flight, ending: Ending, log: FlightLog) -> Row:
-        """Return the row of a flown flight, bit for bit equal to that of `row_of`.
-
-        Args:
-            task: run and law.
-            flight: with its plant in the state at the end.
-            ending: of the flight.
-            log: of the whole flight.
+    def measured_row(self, task: Task, flight: Flight, ending: Ending, log: FlightLog) -> Row:
+        """Return the row of a flown flight, whose plant is in the state at the end.
 
         Raises:
             MetricError: an own metric's function raised an error, or returned no number.
         """
-        row = Row(
-            task, ending.outcome, ending.reason, ending.ended_at_s, self.draws.values(task.run)
-        )
+        vary = self.draws.values(task.run)
+        row = Row(task, ending.outcome, ending.reason, ending.ended_at_s, vary)
         if ending.error is None:
             study, own = self.study, of_mapping(self.study.metrics)
-            row = replace(
-                row, **measure_row(log, flight.ticks, study.require, own, study.pointing)._asdict()
-            )
+            measured = measure_row(log, flight.ticks, study.require, own, study.pointing)
+            row = replace(row, **measured._asdict())
         return row.digested(flight.plant.truth.block.tobytes())
 
 
 def _unflown(task: Task, vary: dict[str, Value], error: Exception) -> Row:
-    """Return the row of a task that raised an error."""
     if isinstance(error, InputError) and not isinstance(error, MetricError):
         return Row(task, REFUSED, str(error), vary=vary).digested()
-    if isinstance(error, SpaceRobotError):  # such as a mistake in a user's law
-        return Row(task, FAILED, str(error), vary=vary).digested()
-    return Row(task, FAILED, one_line_of(error), vary=vary).digested()
+    # an error of this project, such as of a mistake in a user's law, names its place itself
+    text = str(error) if isinstance(error, SpaceRobotError) else one_line_of(error)
+    return Row(task, FAILED, text, vary=vary).digested()
 
 
 @dataclass(frozen=True)
 class BatchFlyer:
-    """Flies several tasks of a campaign at once, see `RowFlyer.together`."""
+    """Flies several tasks of a campaign at once, see `RowFlyer.fly_batch`."""
 
     flyer: RowFlyer
 
     def __call__(self, tasks: tuple[Task, ...]) -> list[Row]:
         """Fly the tasks and return their rows."""
-        return [self.flyer(tasks[0])] if len(tasks) == 1 else self.flyer.together(tasks)
+        return [self.flyer(tasks[0])] if len(tasks) == 1 else self.flyer.fly_batch(tasks)
 
 
 @lru_cache(maxsize=4)
-def _loaded(flyer: RowFlyer) -> tuple[Study, Draws]:
+def _resolved_draws(flyer: RowFlyer) -> Draws:
     study = Study.model_validate_json(flyer.text).named(flyer.where)
-    return study, Draws(study, flyer.seed, flyer.runs)
+    return Draws(study, flyer.seed, flyer.runs)

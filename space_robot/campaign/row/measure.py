@@ -23,20 +23,12 @@ from ...analysis.torques import lacking_for_ripple
 from ...flight.flown_log import empty_log
 from ...flight.plan import Flight
 from ..study import Requirement
-from .bands import largest_in_bins
+
+Array = NDArray[np.float64]
 
 COLUMNS = (
-    "attitude_angle",
-    "attitude",
-    "joints_*",
-    "base_torque",
-    "force_prismatic",
-    "torque_*",
-    "attitude_drift",
-    "tool",
-    "tool_rotation",
-    "half_cone",
-    "about_axis",
+    *("attitude_angle", "attitude", "joints_*", "base_torque", "force_prismatic", "torque_*"),
+    *("attitude_drift", "tool", "tool_rotation", "half_cone", "about_axis"),
 )
 """Columns of series whose RMS and maximum every row has, and their bands over time."""
 SERIES = ("errors", "torques", "drift", "tool")
@@ -47,12 +39,15 @@ FURTHER = (
     *(f"{angle}.jitter_{key}" for angle in COLUMNS[-2:] for key in ("rms", "max")),
     "*.settling",
     "wheels.saturation",
+    "torque_limits.share",
 )
 """Further metrics of every row, as far as a flight has them."""
-FURTHER_GROUPS = ("steadiness", "ripple", "settling", "wheel_saturation")
-"""The groups with these metrics."""
-OF_MESSAGES = ("navigation", "saturation", "latency", "commands", "estimate_error")
+FURTHER_GROUPS = ("steadiness", "ripple", "settling", "wheel_saturation", "saturation")
+"""The groups with these metrics. Every row also has the whole group ``standing``."""
+MESSAGE_GROUPS = ("navigation", "saturation", "latency", "commands", "estimate_error")
 """Groups that need more of a flight than its true states: measurements, commands."""
+BINS = 100
+"""Bins of a band; a flight with fewer ticks has one bin per tick."""
 
 
 class Measured(NamedTuple):
@@ -65,8 +60,15 @@ class Measured(NamedTuple):
 
 
 def planned(flight: Flight, budget: PointingBudget | None = None) -> AnalysedLog:
-    """Return a flight before it is flown, for the names of its metrics."""
-    return AnalysedLog(empty_log(flight, 0, 1, is_brief=True), budget)
+    """Return a flight before it is flown, for the names of its metrics: only its mission is known.
+
+    ``budget``: of the base's pointing; None: the default.
+    """
+
+    def allocate(shape: tuple[int, ...]) -> Array:
+        return np.broadcast_to(np.nan, shape)  # takes no memory
+
+    return AnalysedLog(empty_log(flight, allocate=allocate, is_brief=True), budget)
 
 
 def row_metrics(flight: AnalysedLog, require: Iterable[Requirement] = ()) -> list[str]:
@@ -76,14 +78,18 @@ def row_metrics(flight: AnalysedLog, require: Iterable[Requirement] = ()) -> lis
     usual = [f"{column}.{statistic}" for statistic in ("rms", "max") for column in columns]
     for template in FURTHER:
         usual += [name for name in known if fnmatchcase(name, template)]
-    asked = [demand.metric for demand in require if window_of(demand) == Window()]
+    usual += GROUPS["standing"].evaluate(flight, range(flight.log.ticks))  # of joints that move
+    asked = [demand.metric for demand in require if demand.window == Window()]
     return list(dict.fromkeys([*usual, *asked]))
 
 
-def needs_truth_only(require: Iterable[Requirement]) -> bool:
-    """Return True if a log of the true states alone has all metrics that are required."""
+def needs_truth_only(flights: Iterable[Flight], require: Iterable[Requirement]) -> bool:
+    """Return True if logs of the true states alone have all metrics of the flights' rows."""
+    plants = [flight.plant_settings for flight in flights]
+    if any(plant.base_torque_limit or plant.joint_torque_limit for plant in plants):
+        return False
     groups = (group_of(demand.metric) for demand in require)
-    return not any(group and group.name in OF_MESSAGES for group in groups)
+    return not any(group and group.name in MESSAGE_GROUPS for group in groups)
 
 
 def row_columns(flight: AnalysedLog) -> list[str]:
@@ -104,43 +110,36 @@ def measure_row(
     own: Collection[OwnMetric] = (),
     budget: PointingBudget | None = None,
 ) -> Measured:
-    """Return the numbers of a complete flight.
+    """Return the numbers of a complete flight, with metrics of the user's ``own``.
 
-    Args:
-        log: of the flight.
-        ticks: of the flight as it was planned.
-        require: the requirements by name.
-        own: metrics of the user's own.
-        budget: of the base's pointing; None: the default.
+    ``ticks``: of the flight as it was planned; ``budget`` None: the default.
 
     Raises:
         MetricError: an own metric's function raised an error, or returned no number.
     """
     flight = AnalysedLog(log, budget)
-    columns, of_own = row_columns(flight), {metric.name: metric for metric in own}
-    wanted = [m for m in row_metrics(flight, require.values()) if m not in of_own]
+    columns, own_by_name = row_columns(flight), {metric.name: metric for metric in own}
+    wanted = [m for m in row_metrics(flight, require.values()) if m not in own_by_name]
     metrics = evaluate(flight, wanted)[0]
     metrics |= {metric.name: metric.value(log) for metric in own}
     values = {}
     for name, demand in require.items():
-        window, metric = window_of(demand), demand.metric
+        window, metric = demand.window, demand.metric
         if window == Window():
             values[name] = metrics.get(metric, np.nan)
-        elif metric in of_own:
+        elif metric in own_by_name:
             rows = window.ticks(log.ticks, log.timebase.period)
-            values[name] = of_own[metric].value(log.rows(rows.start, rows.stop))
+            values[name] = own_by_name[metric].value(log.rows(rows.start, rows.stop))
         else:
             values[name] = evaluate(flight, [metric], window)[0].get(metric, np.nan)
-    sizes: list[tuple[int, dict[str, NDArray[np.float64]]]] = []
-    for name in _series(flight):
-        group = GROUPS[name]
-        if isinstance(group, SeriesGroup):
-            sizes += [
-                (start, {c: size for c, size in own_sizes.items() if c in columns})
-                for start, own_sizes in group.sizes(flight)
-            ]
-    of_columns = largest_in_bins(sizes, ticks)
-    return Measured(_finite(metrics), _finite(values), {name: of_columns[name] for name in columns})
+    blocks = [
+        (start, {column: size for column, size in sizes.items() if column in columns})
+        for group in map(GROUPS.__getitem__, _series(flight))
+        if isinstance(group, SeriesGroup)
+        for start, sizes in group.sizes(flight)
+    ]
+    bands = largest_in_bins(blocks, ticks)
+    return Measured(_finite(metrics), _finite(values), {name: bands[name] for name in columns})
 
 
 def check_requirements(
@@ -151,18 +150,9 @@ def check_requirements(
     own: Collection[str] = (),
     budget: PointingBudget | None = None,
 ) -> None:
-    """Check that a flight has the metrics of all requirements.
+    """Check that a flight has the metrics of all requirements, or the user's ``own`` names.
 
-    Args:
-        flight: the nominal one, or one with a varied option.
-        require: the requirements by name.
-        where: the file, for errors.
-        context: difference from the nominal flight, for errors.
-        own: names of the user's own metrics.
-        budget: of the base's pointing; None: the default.
-
-    Raises:
-        InputError: an unknown metric, a window without ticks, or one too short for the metric.
+    Errors name the file, ``where``, and the difference from the nominal flight, ``context``.
     """
     if not require:
         return
@@ -179,7 +169,7 @@ def check_requirements(
                 f"{key}.from_s: must be before the end of the flight ({end:g} s), "
                 f"got {demand.from_s:g}{context}"
             )
-        ticks = len(window_of(demand).ticks(flight.ticks, flight.period))
+        ticks = len(demand.window.ticks(flight.ticks, flight.period))
         if not ticks:
             raise InputError(
                 f"{key}.to_s: no tick between {demand.from_s:g} and {demand.to_s:g} s, "
@@ -192,10 +182,28 @@ def check_requirements(
             raise InputError(f"{key}.metric: {demand.metric} {lacking}{context}")
 
 
-def window_of(demand: Requirement) -> Window:
-    """Return the time window of a requirement."""
-    return Window(demand.from_s, demand.to_s)
-
-
 def _finite(values: Mapping[str, float]) -> dict[str, float]:
     return {name: value for name, value in values.items() if np.isfinite(value)}
+
+
+def largest_in_bins(
+    blocks: Iterable[tuple[int, Mapping[str, Array]]], ticks: int
+) -> dict[str, NDArray[np.float32]]:
+    """Return the largest size of each column in each bin; bin k of K begins at ``k ticks // K``.
+
+    Args:
+        blocks: first tick, and the sizes (N,) by column, of each block of a flight.
+        ticks: of the whole flight, which was flown to its end.
+    """
+    count = min(BINS, ticks)
+    starts = np.arange(count, dtype=np.int64) * ticks // count
+    largest: dict[str, Array] = {}
+    for first, sizes in blocks:
+        for name, size in sizes.items():
+            own = largest.setdefault(name, np.zeros(count))
+            low = int(np.searchsorted(starts, first, side="right")) - 1
+            high = int(np.searchsorted(starts, first + len(size), side="left"))
+            cuts = np.maximum(starts[low:high] - first, 0)
+            np.maximum(own[low:high], np.maximum.reduceat(size, cuts), out=own[low:high])
+    with np.errstate(over="ignore"):
+        return {name: values.astype(np.float32) for name, values in largest.items()}

@@ -1,22 +1,27 @@
-"""A row of a campaign's table: the result of one run under one law."""
+"""Rows of a campaign's table, each the result of one run under one law, and its columns."""
 
 from __future__ import annotations
 
 import hashlib
 import struct
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
-from typing import NamedTuple
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from typing_extensions import Self
 
+from space_robot_msgs_py.config.validation import StrictModel
+
 from ...flight.ending import COMPLETE
 
+if TYPE_CHECKING:
+    from pandas import DataFrame
+
 KILLED, OUT_OF_TIME, REFUSED = "killed", "out_of_time", "refused"
-"""Outcomes beside those of `Ending`: the process died repeatedly; the time limit was exceeded;
-the draw cannot be flown, for example an invalid robot."""
+"""Outcomes in addition to those of `Ending`: the process died repeatedly; the time limit was
+exceeded; the draw cannot be flown, for example an invalid robot."""
 Value = float | str
 """Value of a variable."""
 
@@ -80,3 +85,44 @@ def _take(digest: hashlib._Hash, values: Mapping[str, Value]) -> None:
     for name, value in values.items():
         data = value.encode() if isinstance(value, str) else struct.pack("<d", value)
         digest.update(name.encode() + b"\0" + data + b"\0")
+
+
+class Columns(StrictModel):
+    """The columns of a campaign's table, in order."""
+
+    vary: dict[str, Literal["float64", "str"]]
+    """Kind of each variable."""
+    grid: dict[str, int]
+    """Number of values of each grid variable."""
+    metrics: list[str]
+    require: list[str]
+    bands: list[str]
+
+    def table(self, rows: Iterable[Row]) -> DataFrame:
+        """Return rows as a data frame: missing numbers are NaN, missing bands None."""
+        import pandas
+
+        rows = list(rows)
+        table: dict[str, Any] = {
+            "run": np.array([row.task.run for row in rows], np.int64),
+            "law": [row.task.law for row in rows],
+            "outcome": [row.outcome for row in rows],
+            "reason": [row.reason for row in rows],
+            "ended_at_s": np.array([row.ended_at_s for row in rows], float),
+        }
+        for name, kind in self.vary.items():
+            values = [row.vary.get(name) for row in rows]
+            is_text = kind == "str"
+            table[f"vary.{name}"] = (
+                [None if value is None else str(value) for value in values]
+                if is_text
+                else np.array(values, float)
+            )
+        for name in self.metrics:
+            table[f"metric.{name}"] = np.array([row.metrics.get(name) for row in rows], float)
+        for name in self.require:
+            table[f"require.{name}"] = np.array([row.require.get(name) for row in rows], float)
+        for name in self.bands:
+            bands = [row.bands.get(name) for row in rows]
+            table[f"band.{name}"] = pandas.Series(bands, dtype=object)
+        return pandas.DataFrame(table | {"digest": [row.digest for row in rows]})

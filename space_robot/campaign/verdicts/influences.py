@@ -80,17 +80,10 @@ class Sensitivity:
 def sensitivity(
     table: DataFrame, law: str, column: str, confidence: float = 0.95, sign: float = 1.0
 ) -> Sensitivity | None:
-    """Compute the influence of each variable on a metric under a law.
+    """Compute the influence of each variable on a metric; None: no variables, or too few runs.
 
-    Args:
-        table: rows of a campaign, at one point of its grid.
-        law: as in the table.
-        column: such as ``metric.attitude.rms``.
-        confidence: of the intervals.
-        sign: 1 if a larger metric is worse, -1 if a smaller one is.
-
-    Returns:
-        None if there are no variables, or too few completed runs.
+    The table is at one point of a grid, a column is such as ``metric.attitude.rms``, and sign is 1
+    if a larger metric is worse, -1 if a smaller one is.
     """
     rows = law_rows(table, law)
     ranks = _ranks(penalised(rows, column, sign))
@@ -114,17 +107,10 @@ def sensitivity(
 def rank_correlations(
     variables: list[Array], ranks: Array, confidence: float = 0.95
 ) -> tuple[list[Estimate], list[Estimate | None], float | None]:
-    """Compute plain and partial rank correlations of each variable with a metric.
+    """Compute Spearman's and partial correlations of variables (N,) with a metric's ranks (N,).
 
-    Intervals are Fisher's, with the variance of Bonett and Wright (2000) for ranks.
-
-    Args:
-        variables: (N,) values of each.
-        ranks: (N,) ranks of the metric.
-        confidence: of the intervals.
-
-    Returns:
-        Spearman's correlations; partial ones; the share explained by all (adjusted R squared).
+    Also returns the share explained by all (adjusted R squared). Intervals are Fisher's, with the
+    variance of Bonett and Wright (2000) for ranks.
     """
     if not variables:
         return [], [], None
@@ -150,7 +136,6 @@ def _ranks(values: Array | Series) -> Array:
 
 
 def _interval(r: float, free: int, confidence: float) -> Estimate:
-    """Return a rank correlation with Fisher's interval; ``free``: N - 3 - fixed variables."""
     r = min(1.0, max(-1.0, r))
     if free < 1 or abs(r) == 1.0:
         return Estimate(r, -1.0 if free < 1 else r, 1.0 if free < 1 else r)
@@ -160,7 +145,6 @@ def _interval(r: float, free: int, confidence: float) -> Estimate:
 
 
 def _compare_groups(series: Series, ranks: Array) -> tuple[float, float]:
-    """Return epsilon squared and the p value of Kruskal and Wallis for a variable's groups."""
     runs = len(ranks)
     if series.dtype.kind in "fiu" and series.nunique() > GROUPS:
         count = max(2, min(GROUPS, runs // FEWEST))
@@ -200,15 +184,15 @@ class SobolIndices:
 def sobol_indices(
     values: Array, variables: list[str], law: str = "", metric: str = "", confidence: float = 0.95
 ) -> SobolIndices | None:
-    """Compute first-order and total indices.
+    """Compute first-order and total indices of d variables; the bootstrap has a fixed seed.
 
     Args:
         values: (rows, d + 2): the metric of each row of the design at A, at A with variable i from
             B for each of the d variables, and at B; rows with missing values are ignored.
-        variables: d names.
-        law: for the result.
+        variables: their names.
+        law: for the result, as ``metric``.
         metric: for the result.
-        confidence: of the intervals; the bootstrap has a fixed seed.
+        confidence: of the intervals.
 
     Returns:
         None if fewer than four rows are complete, or the metric does not vary.

@@ -20,8 +20,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import binom, binomtest
 
+from .requirements import Interval, share_interval
 from .rows import law_rows, laws_in, penalised
-from .share_test import Interval, share_interval
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -44,13 +44,8 @@ class Estimate(NamedTuple):
 def quantile(values: Array, share: float, confidence: float = 0.95) -> Estimate:
     """Estimate a quantile and its distribution-free confidence interval, by order statistics.
 
-    All three numbers are sample values, so infinite ones (failed flights) need no arithmetic. With
-    too few values an end of the interval is infinite.
-
-    Args:
-        values: (N,) of independent runs, N > 0, without NaN.
-        share: probability of the quantile, 0 to 1; 0.5 for the median.
-        confidence: of the interval, 0 to 1.
+    All three numbers are of the (N,) values, N > 0 and none NaN, so infinite ones (failed flights)
+    need no arithmetic. With too few values an end of the interval is infinite.
     """
     ordered, n = np.sort(values), len(values)
     tail = 0.5 * (1.0 - confidence)
@@ -109,12 +104,9 @@ class PairedComparison:
 
 
 def compare_all(table: DataFrame, column: str, confidence: float = 0.95) -> list[PairedComparison]:
-    """Compare every pair of laws over the runs that both flew.
+    """Compare every pair of laws at one point of a grid over the runs that both flew.
 
-    Args:
-        table: rows of a campaign, at one point of its grid.
-        column: name of the metric's column; smaller is better.
-        confidence: of the intervals, and of all findings jointly.
+    Smaller values of the column are better; ``confidence`` is that of all findings jointly.
     """
     numbers = table[["run", "law"]].assign(value=penalised(table, column))
     by_law = numbers.pivot(index="run", columns="law", values="value")
@@ -132,14 +124,9 @@ def compare_all(table: DataFrame, column: str, confidence: float = 0.95) -> list
 def compare(
     a: Array, b: Array, confidence: float = 0.95, law: str = "A", other: str = "B"
 ) -> PairedComparison:
-    """Compare the values of two laws in the same runs, without correction for multiple tests.
+    """Compare the values (N,) of two laws in the same runs, without correction for multiple tests.
 
-    Args:
-        a: (N,) values of the law; smaller is better; infinite where the flight failed.
-        b: (N,) values of the other law in the same runs.
-        confidence: of the intervals.
-        law: name of the law.
-        other: name of the other law.
+    Smaller values are better, infinite ones are of flights that failed.
     """
     runs, better, worse = len(a), int(np.sum(a < b)), int(np.sum(a > b))
     failed, other_failed = (
@@ -204,13 +191,7 @@ class League:
 
 
 def league(table: DataFrame, column: str, confidence: float = 0.95) -> League:
-    """Rank the laws by a metric (smaller is better).
-
-    Args:
-        table: rows of a campaign, at one point of its grid.
-        column: such as ``metric.attitude.rms``.
-        confidence: of intervals, and of all findings of this league jointly.
-    """
+    """Rank the laws at one point of a grid by a column such as ``metric.attitude.rms``."""
     comparisons = compare_all(table, column, confidence)
     losers = [c.other for c in comparisons if c.finding == "better"]
     losers += [c.law for c in comparisons if c.finding == "worse"]

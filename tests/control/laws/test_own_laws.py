@@ -16,7 +16,7 @@ from bags import redescribed
 from command import Run
 
 from space_robot.analysis import analyze
-from space_robot.campaign.store.software import file_digests
+from space_robot.campaign.flown.manifest import file_digests
 from space_robot.flight.plan import Flight, Scenario, resolve
 from space_robot.flight.replay.choice import ControllerChoice
 from space_robot.flight.simulate import simulate

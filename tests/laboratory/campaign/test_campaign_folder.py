@@ -19,11 +19,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from space_robot.campaign.flown import Campaign, FlownCampaign
+from space_robot.campaign.flown.manifest import Columns, Manifest, file_digests, source_digest
+from space_robot.campaign.flown.store import begin_or_resume, held_store
 from space_robot.campaign.report.findings import Findings
 from space_robot.campaign.row.row import Row, Task
-from space_robot.campaign.store.manifest import Columns, Manifest
-from space_robot.campaign.store.software import file_digests, source_digest
-from space_robot.campaign.store.store import begin_or_resume, held_store
 from space_robot.campaign.study import Study
 from space_robot_control.laws.names import NotTrustedError
 from space_robot_msgs_py.errors import InputError

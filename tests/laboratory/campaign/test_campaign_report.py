@@ -22,12 +22,12 @@ from pandas import DataFrame
 from rich.console import Console
 
 from space_robot.campaign.flown import FlownCampaign
+from space_robot.campaign.flown.store import held_store
 from space_robot.campaign.report import documents
 from space_robot.campaign.report.documents import print_report, record, render
 from space_robot.campaign.report.figures import bands
 from space_robot.campaign.report.findings import Findings, Quantity
 from space_robot.campaign.report.tables import demand_text, number, verdict_table
-from space_robot.campaign.store.store import held_store
 from space_robot.campaign.study import Requirement, Study
 from space_robot.campaign.verdicts.laws import league
 from space_robot.cli.campaign import name_of

@@ -18,8 +18,14 @@ from scipy.stats import qmc, truncnorm
 
 from space_robot.api import Scenario
 from space_robot.campaign.draws import Draws
-from space_robot.campaign.draws.designs import bits, noise_seed, permutation, shifted, uniform
-from space_robot.campaign.draws.distributions import read_distribution
+from space_robot.campaign.draws.distributions import (
+    bits,
+    noise_seed,
+    permutation,
+    read_distribution,
+    shifted,
+    uniform,
+)
 from space_robot.campaign.draws.robot_numbers import rotation, spread
 from space_robot.campaign.flown.preparation import Preparation
 from space_robot.campaign.study import Requirement, Study, read_study, short_names
@@ -86,20 +92,19 @@ def numbers(draws: Draws) -> NDArray[np.float64]:
 def test_nothing_else_changes_a_draw() -> None:
     reordered = {**OTHER, **dict(reversed(VARY.items()))}
     few, many, other = (
-        Draws(study(vary), 7, runs, check=False)
-        for vary, runs in ((VARY, 5), (VARY, 500), (reordered, 50))
+        Draws(study(vary), 7, runs) for vary, runs in ((VARY, 5), (VARY, 500), (reordered, 50))
     )
     for run in range(5):
         drawn = few.values(run)
         assert drawn == many.values(run)
         assert drawn.items() <= other.values(run).items()
-    assert few.values(3) != Draws(study(VARY), 8, 5, check=False).values(3)
+    assert few.values(3) != Draws(study(VARY), 8, 5).values(3)
     with pytest.raises(InputError, match="runs 0 to 4"):
         few.values(5)
 
 
 def test_all_laws_fly_the_same_robot_and_noise() -> None:
-    draws = Draws(study(VARY), 7, 5, check=False)
+    draws = Draws(study(VARY), 7, 5)
     one, two = (draws.scenario(3, law) for law in ("ctc", "tde_stc"))
     assert one.seed == two.seed != draws.scenario(2, "ctc").seed
     assert np.array_equal(one.plant_robot.mass, two.plant_robot.mass)
@@ -144,7 +149,7 @@ def test_settings_and_gains_change_from_their_nominal_values() -> None:
 
 def test_faults_of_each_axis_and_times() -> None:
     grid = {"faults": {"torque_scale@0:[*]": {"grid": [0.9, 1.0]}}}
-    assert Draws(study(grid), 0, 2**9, check=False).grid == {
+    assert Draws(study(grid), 0, 2**9).grid == {
         f"faults.torque_scale@0:{axis}": 2
         for axis in ("base_x", "base_y", "base_z", *(f"joint{k}" for k in range(1, 7)))
     }
@@ -165,16 +170,15 @@ def test_faults_of_each_axis_and_times() -> None:
 
 
 def test_a_latin_hypercube_has_one_number_in_every_stratum_each_in_its_own_order() -> None:
-    draws = Draws(study(VARY, design="latin_hypercube"), 3, 40, check=False)
+    draws = Draws(study(VARY, design="latin_hypercube"), 3, 40)
     scaled = (numbers(draws)[:, -6:] + 2.0) / 4.0 * 40
     strata = scaled.astype(int)
     assert np.array_equal(np.sort(strata, axis=0), np.tile(np.arange(40)[:, None], 6))
     for other in (strata, scaled - strata):  # places of the strata, and within them
         correlation = np.corrcoef(other.T) - np.eye(6)
         assert np.abs(correlation).max() < 0.55  # 3.4 sigma of 40
-    again = Draws(study(VARY, design="latin_hypercube"), 4, 40, check=False)
+    again = Draws(study(VARY, design="latin_hypercube"), 4, 40)
     assert not np.any(numbers(again)[:, -6:] == numbers(draws)[:, -6:])
-    assert draws.needs_all_runs
 
 
 def test_sobol_points_are_scipys_with_their_bits_shifted() -> None:
@@ -197,9 +201,7 @@ def test_sobol_points_are_scipys_with_their_bits_shifted() -> None:
 
 def test_saltellis_rows_take_one_variable_from_the_other_point() -> None:
     vary = {"mission.start_deg": {"uniform": [0, 1]}}
-    draws = Draws(study(vary, design="saltelli"), 3, 8 * 64, check=False)
-    assert draws.blocks is not None
-    assert draws.blocks.rows == 64
+    draws = Draws(study(vary, design="saltelli"), 3, 8 * 64)
     table = numbers(draws).reshape(64, 8, 6)
     a, b = table[:, 0], table[:, -1]
     assert not np.any(a == b)
@@ -222,7 +224,7 @@ def test_what_must_stay_positive_is_a_truncated_normal() -> None:
         ({"normal": -5.0, "sigma": 10.0, "offset": True}, -5.0, 10.0, -0.99 * nominal),
     ):
         vary = {"robot.links[1].mass": told}
-        (variable,) = Draws(study(vary), 0, 1, check=False)._variables
+        (variable,) = Draws(study(vary), 0, 1)._variables
         expected = truncnorm((least - mean) / sigma, np.inf, mean, sigma).ppf(u)
         assert [variable.distribution.quantile(x) for x in u] == pytest.approx(expected, rel=1e-6)
 
@@ -239,7 +241,7 @@ def test_every_robot_that_is_drawn_can_be(seed: int, name: str) -> None:
         "robot.base.com[*]": {"normal": 0.0, "sigma": 0.1, "offset": True},
     }
     asked = study(vary, scenario={"robot": name, "duration": 0.1})
-    robot = Draws(asked, 0, 2**31, check=False).scenario(seed, "ctc").plant_robot
+    robot = Draws(asked, 0, 2**31).scenario(seed, "ctc").plant_robot
     assert np.all(robot.mass > 0.0)
     moments = np.linalg.eigvalsh(robot.inertia)
     assert np.all(moments > 0.0)

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import multiprocessing
+import os
+import signal
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -13,13 +15,12 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from space_robot import Scenario, load_bag
-from space_robot.campaign.flown import Campaign, FlownCampaign, bags, flights, precision
-from space_robot.campaign.flown.flights import Progress
-from space_robot.campaign.flown.precision import CHECKED_EVERY, Precision
+from space_robot.campaign.flown import Campaign, FlownCampaign, flights
+from space_robot.campaign.flown.flights import CHECKED_EVERY, Precision, Progress
 from space_robot.campaign.report.findings import Findings
 from space_robot.campaign.row.row import Row, Task
 from space_robot.campaign.study import Study
-from space_robot.campaign.verdicts.share_test import Sequential
+from space_robot.campaign.verdicts.requirements import Sequential
 from space_robot.flight.compilation import compile_kernels
 from space_robot.processes.executor import Done, WorkerDiedError, run_many
 from space_robot_msgs_py.errors import InputError
@@ -82,6 +83,28 @@ def test_killed_it_goes_on_to_the_same_table(undisturbed: FlownCampaign, tmp_pat
     assert table_of(found.folder) == table_of(undisturbed.folder)
 
 
+def test_a_cluster_that_loses_a_worker_flies_every_row(
+    undisturbed: FlownCampaign, tmp_path: Path
+) -> None:
+    """With Dask's own number of allowed failures; one of two workers is killed in flight."""
+    distributed = pytest.importorskip("distributed")
+    options = {"host": "127.0.0.1", "dashboard_address": ":0", "silence_logs": "CRITICAL"}
+    killed: list[int] = []
+
+    def kill_one(progress: Progress) -> None:
+        if progress.done >= 8 and not killed:
+            killed.append(cluster.workers[0].pid)
+            os.kill(killed[0], signal.SIGKILL)
+
+    with distributed.LocalCluster(n_workers=2, threads_per_worker=1, **options) as cluster:
+        address = cluster.scheduler_address
+        asked = {"scheduler": address, "timeout_s": 60.0, "progress": kill_one}  # one by one
+        found = Campaign(study()).run(RUNS, 7, tmp_path / "cluster", **asked)
+        assert killed[0] != cluster.workers[0].pid
+    assert len(found.table) == 2 * RUNS
+    assert table_of(found.folder) == table_of(undisturbed.folder)
+
+
 def test_more_runs_extend_it(undisturbed: FlownCampaign, tmp_path: Path) -> None:
     few = Campaign(study()).run(3, 7, tmp_path / "a", workers=0)
     assert len(few.table) == 6
@@ -140,7 +163,7 @@ def test_it_stops_at_a_precision_whoever_flies_it(
     content["require"] = {"p": {"metric": "attitude.max", "below": 1.0, "in": 0.9}}
     content["vary"] = {"scenario.case": {"grid": ["1", "2"]}}
     content["until"] = {"half_width": 0.4, "runs": 50}
-    monkeypatch.setattr(precision, "CHECKED_EVERY", 5)
+    monkeypatch.setattr(flights, "CHECKED_EVERY", 5)
     asked = Campaign(Study.model_validate(content))
     one = asked.run(out=tmp_path / "one", workers=0)
     asked.run(out=tmp_path / "two", workers=2)
@@ -163,7 +186,7 @@ def test_failures_are_kept_as_bags(tmp_path: Path, monkeypatch: pytest.MonkeyPat
     (tmp_path / "b/bags/0_tde_stc").rename(tmp_path / "b/bags/.0_tde_stc")  # killed while at it
     keep.run(1, 7, tmp_path / "b", workers=0)
     assert sorted(path.name for path in (tmp_path / "b/bags").iterdir()) == kept
-    assert bags.bag_name(Task(3, "ctc=my/gains")) == "3_ctc=my_gains"
+    assert flights.bag_name(Task(3, "ctc=my/gains")) == "3_ctc=my_gains"
 
 
 def test_without_a_folder_it_lasts_as_long_as_the_object() -> None:

@@ -151,6 +151,30 @@ def test_a_mission_of_segments_has_the_error_of_its_tool() -> None:
     assert "tool" not in row_columns(planned(plain.flight))
 
 
+def test_limits_of_torques_and_joints_that_stand_have_columns_as_far_as_the_log_has_them() -> None:
+    """One joint is to move; the names are known before the flight."""
+    mission = {
+        "start": {"joints_deg": [0, 90, 200, 20, 30, 10]},
+        "segments": [{"joints_deg": [5, 90, 200, 20, 30, 10], "duration": 1.2}],
+    }
+    limits = {"plant": {"joint_torque_limit": 1.0}}
+    flown = Scenario(controller="ctc", mission=mission, parameters=limits).fly()
+    metrics = numbers_of(flown).metrics
+    assert [name for name in metrics if name.endswith(".standing")] == ["joint1.standing"]
+    assert metrics["torque_limits.share"] == flown.metrics["torque_limits.share"] > 0.0
+    known = row_metrics(planned(flown.flight))
+    assert [name for name in known if name in metrics] == list(metrics)
+    assert [name for name in known if name.endswith(".standing")] == ["joint1.standing"]
+
+
+def test_limits_of_torques_are_the_same_in_lanes() -> None:
+    limited = flyer(parameters={"plant": {"joint_torque_limit": 1.0}}, sensors="fine")
+    tasks = [Task(run, "tde_stc") for run in range(3)]
+    rows = limited.fly_batch(tasks)
+    assert {row.task: row.digest for row in rows} == {t: limited(t).digest for t in tasks}
+    assert all("torque_limits.share" in row.metrics for row in rows)
+
+
 TASK = Task(1, "tde_stc")
 
 

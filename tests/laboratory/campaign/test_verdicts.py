@@ -15,17 +15,15 @@ from scipy.stats import beta
 
 from space_robot.campaign.study import Requirement, Study
 from space_robot.campaign.verdicts.requirements import (
-    Verdict,
-    projected_decision,
-    verdict,
-    verdicts,
-)
-from space_robot.campaign.verdicts.share_test import (
     FixedSample,
     Sequential,
     ShareTest,
+    Verdict,
     log_evidence,
+    projected_decision,
     share_interval,
+    verdict,
+    verdicts,
 )
 
 

@@ -43,15 +43,7 @@ class CampaignStore:
     """The database of a campaign's folder; a context manager."""
 
     def __init__(self, path: Path, is_read_only: bool = True) -> None:
-        """Open a database and check that it is undamaged.
-
-        Args:
-            path: of the file.
-            is_read_only: False: it is created if it does not exist, see `held_store`.
-
-        Raises:
-            InputError: it cannot be opened, or is damaged.
-        """
+        """Open a database and check that it is undamaged; one to be written is created."""
         self.path, self._is_read_only = path, is_read_only
         with self._named_errors():
             uri = f"{path.absolute().as_uri()}?mode={'ro' if is_read_only else 'rwc'}"
@@ -92,11 +84,7 @@ class CampaignStore:
             self._database.execute(query, (manifest.model_dump_json(),))
 
     def add(self, row: Row) -> None:
-        """Store a row; it replaces an older one of the same task.
-
-        Raises:
-            InputError: the database cannot be written.
-        """
+        """Store a row; it replaces an older one of the same task."""
         mappings = row.vary, row.metrics, row.require, {n: len(b) for n, b in row.bands.items()}
         values = (
             *row.task,
@@ -112,11 +100,7 @@ class CampaignStore:
             self._database.execute(query, values)
 
     def rows(self) -> Iterator[Row]:
-        """Yield all rows, ordered by run.
-
-        Raises:
-            InputError: the database cannot be read, or is damaged.
-        """
+        """Yield all rows, ordered by run."""
         with self._named_errors():
             for values in self._database.execute("SELECT * FROM flights ORDER BY run"):
                 run, law, outcome, reason, ended_at_s, *texts, bands, digest = values
@@ -127,17 +111,8 @@ class CampaignStore:
                     by_name = dict(zip(lengths, parts, strict=True))
                 except (ValueError, TypeError) as error:
                     raise sqlite3.DatabaseError(f"run {run} under {law}: {error}") from None
-                yield Row(
-                    Task(run, law),
-                    outcome,
-                    reason,
-                    ended_at_s,
-                    vary,
-                    metrics,
-                    require,
-                    by_name,
-                    digest,
-                )
+                numbers = vary, metrics, require, by_name
+                yield Row(Task(run, law), outcome, reason, ended_at_s, *numbers, digest)
 
     @contextmanager
     def _named_errors(self) -> Iterator[None]:
@@ -152,11 +127,7 @@ class CampaignStore:
 
 
 def open_store(folder: Path) -> CampaignStore:
-    """Open the store of a campaign's folder for reading.
-
-    Raises:
-        InputError: it is not a campaign folder, or the store is damaged.
-    """
+    """Open the store of a campaign's folder for reading."""
     if not (folder / DATABASE).is_file():
         raise InputError(f"{folder}: not a campaign folder (it has no {DATABASE})")
     return CampaignStore(folder / DATABASE)
@@ -164,11 +135,7 @@ def open_store(folder: Path) -> CampaignStore:
 
 @contextmanager
 def held_store(folder: Path) -> Iterator[CampaignStore]:
-    """Open the store of a folder for writing, locked for this process; create what is missing.
-
-    Raises:
-        InputError: another process has locked it, or the folder contains other files.
-    """
+    """Open the store of a folder for writing, locked for this process; create what is missing."""
     make_folder(folder)
     _check_own(folder)
     try:
@@ -189,16 +156,7 @@ def held_store(folder: Path) -> Iterator[CampaignStore]:
 def begin_or_resume(store: CampaignStore, manifest: Manifest, study_text: str) -> str:
     """Write study and manifest of a new campaign, or check that an existing one is the same.
 
-    Args:
-        store: of the folder.
-        manifest: of the campaign to be flown.
-        study_text: text of the campaign's file.
-
-    Returns:
-        A line if the folder's copy of the study was changed, else nothing.
-
-    Raises:
-        InputError: the folder is another campaign's, or cannot be written.
+    Returns a line if the folder's copy of the study was changed, else nothing.
     """
     study, changes = store.path.parent / STUDY, ""
     if before := store.manifest:
@@ -212,12 +170,7 @@ def begin_or_resume(store: CampaignStore, manifest: Manifest, study_text: str) -
 
 
 def study_changes(file: Path, flown: Mapping[str, Any]) -> str:
-    """Return the difference of a folder's copy of the study from the flown one; empty if equal.
-
-    Args:
-        file: the copy in the folder.
-        flown: content of the flown study, see `Study.content`.
-    """
+    """Return how a folder's copy of the study differs from the flown content, or nothing."""
     try:
         now = read_study(file.absolute()).content
     except InputError as error:
