@@ -15,7 +15,7 @@ from space_robot_model.robot import Robot
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.errors import InputError
 
-from ..analysis.described import orbit_of
+from ..analysis.described import plant_settings
 from .extent import base_reach
 from .frames import Frames, held_rows, rounded
 from .glb import revolved_glb
@@ -98,7 +98,7 @@ def is_in_orbit(log: FlightLog) -> bool:
 def sun_direction(log: FlightLog) -> Array | None:
     """Return the unit vector (3,) to the Sun; None: no sunlight acts, or the bag does not tell."""
     try:
-        settings = orbit_of(log)
+        settings = plant_settings(log)
     except InputError:
         return None
     return settings.sun if settings.has_orbit and settings.sunlight.pressure > 0.0 else None

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from space_robot.analysis import analyze
-from space_robot.analysis.load_bag import excerpt
+from space_robot.analysis.analysed_log import excerpt
 from space_robot.analysis.estimate_error import HBar, errors_of, recorded_h_bar
 from space_robot.flight.plan import Flight, Scenario, resolve
 from space_robot.flight.replay.run import RecordedLaws
