@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from space_robot_model.robot import Robot
     from space_robot_model.robot.dynamics import bias_force, forward_dynamics, mass_matrix
 
-    from .analysis.load_bag import load_bag
+    from .analysis.analysed_log import load_bag
     from .api import Bench, FlownFlight, Scenario
     from .api.fly_many import bench_many, fly_many
     from .campaign.flown import Campaign, FlownCampaign
@@ -72,7 +72,7 @@ MODULES = {
     "bias_force": "space_robot_model.robot.dynamics",
     "fly_many": "space_robot.api.fly_many",
     "forward_dynamics": "space_robot_model.robot.dynamics",
-    "load_bag": "space_robot.analysis.load_bag",
+    "load_bag": "space_robot.analysis.analysed_log",
     "make": "space_robot.learning",
     "make_vec": "space_robot.learning",
     "mass_matrix": "space_robot_model.robot.dynamics",

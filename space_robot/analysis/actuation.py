@@ -1,4 +1,4 @@
-"""Metrics of commands, joints and wheels: limits reached, latency, deadlines missed."""
+"""Settling, and metrics of commands, joints and wheels: limits reached, latency, lateness."""
 
 from __future__ import annotations
 
@@ -11,11 +11,15 @@ from space_robot_msgs_py.errors import InputError
 
 from .analysed_log import AnalysedLog
 from .described import NO_LIMITS
-from .errors import measured_rows
-from .series import Definition, Limit, TimeSeries, metrics, series
+from .errors import joined_error, measured_rows, waypoint_ticks
+from .series import Definition, Limit, TimeSeries, largest_sizes, metrics, series
 
 Array = NDArray[np.float64]
 
+BAND = 1e-5
+"""Largest |error| that counts as settled: rad or m on a joint; on eps, which is 4.1 arcsec."""
+SHORTEST_WATCH = 0.1
+"""s of flight after a waypoint without which nothing can be said of settling there."""
 STANDING = 0.01
 """Share of the desired velocity below which a joint stands."""
 ROUNDING = 1e-9
@@ -25,6 +29,47 @@ LONG_STANDING = 0.05
 LEAST_WAY = 1e-3
 """Way, rad or m, from which on it is of interest whether a joint stands."""
 PERCENTILES = {"p50": 50.0, "p99": 99.0, "max": 100.0}
+LIMIT_KINDS = ("position", "velocity", "effort")
+"""Limits of joints in the robot's file."""
+
+
+@metrics(
+    "settling",
+    {
+        "{error}.settling": Definition(
+            "s",
+            "time from the last waypoint after which the error stays to the end within "
+            f"{BAND:g} rad or m on joints, and 4.1 arcsec of the attitude's error on each axis",
+        ),
+        "settling.after": Definition("s", "time of the waypoint from which settling counts"),
+    },
+)
+def settling(flight: AnalysedLog) -> dict[str, float]:
+    """Compute the time from which each error column stays in `BAND`; inf: outside at the end.
+
+    As in control engineering (e.g. Ogata, Modern Control Engineering, 5-3), with a band in
+    absolute terms: a tracking error has no final value to take a share of. The last waypoint of the
+    paper's mission is its last tick, so that the one at 15 s is taken.
+    """
+    log, period = flight.log, flight.log.timebase.period
+    rows = waypoint_ticks(log)
+    watched = rows[rows <= log.ticks - round(SHORTEST_WATCH / period)]
+    if not len(watched):
+        raise InputError("the arm does not come to rest with flight left after it")
+    waypoint = int(watched[-1])
+    last = dict.fromkeys(flight.error_columns, waypoint - 1)
+    for start, stop in flight.blocks():
+        error = joined_error(log.rows(start, stop), flight.attitude_errors(start, stop))
+        for name, axes in flight.error_columns.items():
+            outside = largest_sizes(error[:, axes]) > BAND
+            if outside.any():
+                row = start + len(outside) - 1 - int(np.argmax(outside[::-1]))
+                last[name] = max(last[name], row)
+    numbers = {"settling.after": (log.first_tick + waypoint) * period}
+    for name, row in last.items():
+        is_settled = row < log.ticks - 1
+        numbers[f"{name}.settling"] = (row + 1 - waypoint) * period if is_settled else np.inf
+    return numbers
 
 
 @metrics(
@@ -46,13 +91,16 @@ def saturation(flight: AnalysedLog) -> dict[str, float]:
     the torque as reported, behind the limits and before what the drives make of it.
     """
     limits, log = flight.torque_limits, flight.log.as_measured()
-    ticks, limit = 0, limits.of_axes(log.axes) * (1.0 - ROUNDING)
-    for start, stop in flight.blocks():
+    limit = limits.each_axis(log.axes) * (1.0 - ROUNDING)
+
+    def count(start: int, stop: int) -> int:
         at_limit = np.abs(log.applied_torque[start:stop]) >= limit
-        ticks += int(np.count_nonzero(at_limit.any(axis=1)))
-    numbers = {"torque_limits.ticks": float(ticks), "torque_limits.share": ticks / log.ticks}
-    of_parts = {"torque_limits.base": limits.base, "torque_limits.joints": limits.joint}
-    return numbers | {name: limit for name, limit in of_parts.items() if np.isfinite(limit)}
+        return int(np.count_nonzero(at_limit.any(axis=1)))
+
+    ticks = float(flight.sum_up(count))
+    numbers = {"torque_limits.ticks": ticks, "torque_limits.share": ticks / log.ticks}
+    known = {"torque_limits.base": limits.base, "torque_limits.joints": limits.joint}
+    return numbers | {name: limit for name, limit in known.items() if np.isfinite(limit)}
 
 
 @metrics(
@@ -73,28 +121,23 @@ def saturation(flight: AnalysedLog) -> dict[str, float]:
 def wheel_saturation(flight: AnalysedLog) -> dict[str, float]:
     """Count the ticks at which each wheel's motor gave all it can, or its wheel was full."""
     log, wheels = flight.log, flight.actuators.wheels
-    limits = [wheels.limits(f"max_{key}") for key in ("torque", "momentum")]
-    ticks, any_ticks = np.zeros((2, wheels.count), dtype=np.intp), 0
-    first = np.full(wheels.count, -1)
-    for start, stop in flight.blocks():
-        at_torque, at_momentum = (
-            np.abs(values) >= limit * (1.0 - ROUNDING)
-            for values, limit in zip(wheel_motion(log, start, stop, wheels), limits, strict=True)
-        )
-        ticks += [np.sum(at_torque, axis=0), np.sum(at_momentum, axis=0)]
-        at_either = at_torque | at_momentum
-        here = np.where(at_either.any(axis=0), np.argmax(at_either, axis=0) + start, -1)
-        first = np.where(first < 0, here, first)
-        any_ticks += int(np.count_nonzero(at_either.any(axis=1)))
-    numbers = {
-        "wheels.saturation": any_ticks / log.ticks,
-        "wheels.saturation_ticks": float(any_ticks),
-    }
+    limits = np.array([wheels.limits("max_torque"), wheels.limits("max_momentum")])
+
+    def compare(start: int, stop: int) -> NDArray[np.bool_]:
+        motion = np.stack(wheel_motion(log, start, stop, wheels), axis=1)
+        return np.abs(motion) >= limits * (1.0 - ROUNDING)
+
+    at_limit: NDArray[np.bool_] = np.concatenate(flight.each_block(compare))
+    at_either: NDArray[np.bool_] = np.logical_or.reduce(at_limit, axis=1)
+    ticks = np.count_nonzero(at_limit, axis=0)
+    any_ticks = float(np.count_nonzero(at_either.any(axis=1)))
+    numbers = {"wheels.saturation": any_ticks / log.ticks, "wheels.saturation_ticks": any_ticks}
     for i, name in enumerate(flight.parts("wheel")):
         numbers[f"{name}.torque_limit_ticks"] = float(ticks[0, i])
         numbers[f"{name}.momentum_limit_ticks"] = float(ticks[1, i])
-        if first[i] >= 0:
-            numbers[f"{name}.first_limit"] = (log.first_tick + first[i]) * log.timebase.period
+        if at_either[:, i].any():
+            first = log.first_tick + int(np.argmax(at_either[:, i]))
+            numbers[f"{name}.first_limit"] = first * log.timebase.period
     return numbers
 
 
@@ -133,12 +176,14 @@ def standing(flight: AnalysedLog) -> dict[str, float]:
     A joint stands at a tick at which it is slower than `STANDING` of the desired velocity. Ticks
     count by the desired velocity, so that a joint that starts a little late counts for little.
     """
-    log, (way, held) = flight.log, np.zeros((2, flight.log.reference_joints.shape[2]))
-    for start, stop in flight.blocks():
+    log = flight.log
+
+    def ways(start: int, stop: int) -> Array:
         desired = np.abs(log.reference_joints[start:stop, 1])
         stands = np.abs(log.joint_velocities[start:stop]) < STANDING * desired
-        way += np.sum(desired, axis=0)
-        held += np.sum(desired, axis=0, where=stands)
+        return np.array([np.sum(desired, axis=0), np.sum(desired, axis=0, where=stands)])
+
+    way, held = flight.sum_up(ways)
     return {
         f"{name}.standing": float(held[k] / way[k])
         for k, name in enumerate(log.joint_names)
@@ -152,7 +197,7 @@ def standing(flight: AnalysedLog) -> dict[str, float]:
         f"{{joint}}.beyond_{kind}": Definition(
             "ticks", f"ticks beyond the {kind} of the robot's file"
         )
-        for kind in ("position", "velocity", "effort")
+        for kind in LIMIT_KINDS
     },
 )
 def beyond_limits(flight: AnalysedLog) -> dict[str, float]:
@@ -163,22 +208,25 @@ def beyond_limits(flight: AnalysedLog) -> dict[str, float]:
     log, joints = flight.log, flight.log.joint_names
     limits: Array = np.array(flight.robot.limits[: len(joints)]).reshape(len(joints), 4).T
     lower, upper, velocity, effort = limits
-    ticks = np.zeros((3, len(joints)), dtype=np.intp)
     if not np.isfinite(limits).any():
         return {}
-    for start, stop in flight.blocks():
+
+    def count(start: int, stop: int) -> NDArray[np.intp]:
         position = log.joint_positions[start:stop]
         beyond = (
             np.maximum(position - upper, lower - position) > ROUNDING,
             np.abs(log.joint_velocities[start:stop]) > velocity * (1.0 + ROUNDING),
             np.abs(log.applied_torque[start:stop, 3:]) > effort * (1.0 + ROUNDING),
         )
-        ticks += np.count_nonzero(beyond, axis=1)
+        ticks: NDArray[np.intp] = np.count_nonzero(beyond, axis=1)
+        return ticks
+
+    ticks = flight.sum_up(count)
     return {
         f"{name}.beyond_{kind}": float(ticks[row, k])
         for k, name in enumerate(joints)
         if np.isfinite(limits[:, k]).any()
-        for row, kind in enumerate(("position", "velocity", "effort"))
+        for row, kind in enumerate(LIMIT_KINDS)
     }
 
 
@@ -198,11 +246,10 @@ def latency(flight: AnalysedLog) -> dict[str, float]:
     if not len(known):
         raise InputError("no wall-clock times of states and commands: not flown as a graph")
     numbers = {"latency.answers": float(len(known))}
-    for name, value in zip(
-        PERCENTILES, np.percentile(known, list(PERCENTILES.values())), strict=True
-    ):
-        numbers[f"latency.{name}_ms"] = float(1e3 * value)
-        numbers[f"latency.{name}_ticks"] = float(value / flight.log.timebase.period)
+    for name, percent in PERCENTILES.items():
+        value = float(np.percentile(known, percent))
+        numbers[f"latency.{name}_ms"] = 1e3 * value
+        numbers[f"latency.{name}_ticks"] = value / flight.log.timebase.period
     return numbers
 
 
@@ -237,20 +284,18 @@ def commands(flight: AnalysedLog) -> dict[str, float]:
         limits = NO_LIMITS
     axes = slice(3 if log.flight.get("base_actuators") else 0, None)
     delay = int(log.flight.get("command_latency_ticks", 0)) + 1
-    limit, reported = limits.of_axes(log.axes), log.as_measured()
-    logs = [log] if reported is log else [reported, log]
-    differing = compared = 0
-    for start, stop in flight.blocks():
-        first = max(start, delay)
-        if first >= stop:
-            continue
-        commanded = np.clip(log.commanded_torque[first - delay : stop - delay], -limit, limit)
+    limit, reported, answers = limits.each_axis(log.axes), log.as_measured(), log.commanded_torque
+
+    def count(start: int, stop: int) -> NDArray[np.intp]:
+        first = min(max(start, delay), stop)
+        commanded = np.clip(answers[max(first - delay, 0) : max(stop - delay, 0)], -limit, limit)
         known = np.isfinite(commanded).all(axis=1) & measured_rows(reported, first, stop)
         differ = known.copy()
-        for each in logs:
+        for each in (reported, log):
             differ &= np.any(each.applied_torque[first:stop, axes] != commanded[:, axes], axis=1)
-        differing += int(np.count_nonzero(differ))
-        compared += int(np.count_nonzero(known))
+        return np.array([np.count_nonzero(differ), np.count_nonzero(known)])
+
+    differing, compared = flight.sum_up(count)
     return {
         "commands.unanswered": float(log.unanswered),
         "commands.compared": float(compared),

@@ -1,11 +1,13 @@
-"""What the base's pointing is measured against: axis, band and window."""
+"""A flight log as metrics see it, a part of it by time, and the budget of the base's pointing."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+import math
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from functools import cached_property
-from typing import Annotated
+from pathlib import Path
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,12 +18,15 @@ from space_robot_model.hardware.base_actuators import BaseActuatorSettings
 from space_robot_model.robot import Robot
 from space_robot_model.robot.mission_document import Vector
 from space_robot_msgs_py.bag.flight_log import BLOCK_TICKS, FlightLog, block_bounds
+from space_robot_msgs_py.bag.reader import read_flight
+from space_robot_msgs_py.config.arguments import as_path
 from space_robot_msgs_py.config.validation import StrictModel
 from space_robot_msgs_py.config.yaml_text import parse_yaml
+from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.topics import BASE_AXES
 
 from . import described
-from .errors import AxisIndex, attitude_error, controls_base, error_columns, groups_of
+from .errors import AxisIndex, attitude_error, axis_groups, controls_base, error_columns
 from .errors import torque_columns as columns_of_torque
 
 Array = NDArray[np.float64]
@@ -51,14 +56,8 @@ class PointingBudget(StrictModel):
             direction_norm(axis, "axis")
         return axis
 
-    def of(self, segments: Sequence[str], start: str = "") -> PointingBudget:
-        """Return the budget with the axis that points, of unit length.
-
-        Args:
-            segments: of the mission, as YAML texts.
-            start: what the base points at from the start on, as YAML text; empty: nothing.
-        """
-        pointed = pointed_axis(segments, start)
+    def along(self, pointed: Array | None) -> PointingBudget:
+        """Return the budget with an axis of unit length: its own, else the ``pointed`` one (3,)."""
         axis = np.array(self.axis or (Z if pointed is None else pointed))
         unit = (axis / direction_norm(axis, "axis")).tolist()
         return self.model_copy(update={"axis": unit})
@@ -67,7 +66,7 @@ class PointingBudget(StrictModel):
 def pointed_axis(segments: Sequence[str], start: str = "") -> Array | None:
     """Return the axis (3,) of the first segment of a mission that points the base; None: none does.
 
-    ``segments`` and ``start`` as in `PointingBudget.of`.
+    The segments are YAML texts, as is what the base points at from the ``start`` on.
     """
     for text in [*segments, f"base: {start}"]:
         with suppress(ValueError, TypeError, AttributeError):  # a bag may hold anything
@@ -80,17 +79,21 @@ def pointed_axis(segments: Sequence[str], start: str = "") -> Array | None:
     return None
 
 
-def pointing_of(log: FlightLog) -> tuple[list[str], str]:
-    """Return segments and start of a log's mission, see `PointingBudget.of`, as far as it tells."""
-    if log.scenario is not None:
-        return log.scenario.mission.written_segments, log.scenario.mission.base_point
+def recorded_mission(log: FlightLog) -> dict[str, Any]:
+    """Return the mission that a bag describes; empty: it describes none."""
     scenario = log.flight.get("scenario")
     mission = scenario.get("mission") if isinstance(scenario, dict) else None
-    if not isinstance(mission, dict):
-        return [], ""
-    segments = mission.get("segments")
+    return mission if isinstance(mission, dict) else {}
+
+
+def _pointed_axis_of(log: FlightLog) -> Array | None:
+    if log.scenario is not None:
+        mission = log.scenario.mission
+        return pointed_axis(mission.written_segments, mission.base_point)
+    recorded = recorded_mission(log)
+    segments = recorded.get("segments")
     texts = [str(text) for text in segments] if isinstance(segments, list) else []
-    return texts, str(mission.get("base_point") or "")
+    return pointed_axis(texts, str(recorded.get("base_point") or ""))
 
 
 def window_ticks(window_s: float, period: float) -> int:
@@ -111,22 +114,21 @@ class AnalysedLog:
         budget: PointingBudget | None = None,
         other_actuators: BaseActuatorSettings | None = None,
     ) -> None:
-        """Store the log.
-
-        Args:
-            log: of the flight.
-            budget: of the base's pointing; None: the default.
-            other_actuators: for the sizing, in the place of those that flew.
-        """
+        """``other_actuators``: for the sizing, in the place of those that flew."""
         self.log = log
         self._budget, self.other_actuators = budget, other_actuators
         self.values: dict[str, Array] = {}
         """Values of series that fit into one block, by the series' name."""
 
     @cached_property
+    def pointed_axis(self) -> Array | None:
+        """(3,) the axis that the mission points; None: it points none."""
+        return _pointed_axis_of(self.log)
+
+    @cached_property
     def budget(self) -> PointingBudget:
-        """The pointing budget, with the axis that points."""
-        return (self._budget or PointingBudget()).of(*pointing_of(self.log))
+        """The pointing budget, with the axis that points, of unit length."""
+        return (self._budget or PointingBudget()).along(self.pointed_axis)
 
     @property
     def period(self) -> float:
@@ -141,7 +143,8 @@ class AnalysedLog:
     @cached_property
     def groups(self) -> dict[str, AxisIndex]:
         """The axes by group, see `axis_groups`."""
-        return groups_of(self.log)
+        log = self.log
+        return axis_groups(log.axes - 3, self.controls_base, log.prismatic, log.branches)
 
     @cached_property
     def error_columns(self) -> dict[str, AxisIndex]:
@@ -160,29 +163,17 @@ class AnalysedLog:
 
     @cached_property
     def robot(self) -> Robot:
-        """The robot that was flown.
-
-        Raises:
-            InputError: see `described.robot_of`.
-        """
+        """The robot that was flown, see `described.robot_of`."""
         return described.robot_of(self.log)
 
     @cached_property
     def actuators(self) -> BaseActuatorSettings:
-        """The base's actuators that were flown.
-
-        Raises:
-            InputError: see `described.flown_actuators`.
-        """
+        """The base's actuators that were flown, see `described.flown_actuators`."""
         return described.flown_actuators(self.log)
 
     @cached_property
     def torque_limits(self) -> described.TorqueLimits:
-        """The limits that the plant clipped the torques to.
-
-        Raises:
-            InputError: see `described.torque_limits`.
-        """
+        """The limits that the plant clipped the torques to, see `described.torque_limits`."""
         return described.torque_limits(self.log)
 
     def parts(self, place: str) -> list[str]:
@@ -207,6 +198,15 @@ class AnalysedLog:
         """Return first row and stop of each block, small enough for temporary arrays."""
         return block_bounds(self.log.ticks)
 
+    def each_block(self, function: Callable[[int, int], Any]) -> list[Any]:
+        """Return what a function makes of the rows of each block, from start to before stop."""
+        return [function(start, stop) for start, stop in self.blocks()]
+
+    def sum_up(self, function: Callable[[int, int], Any]) -> Array:
+        """Return the sum of what a function makes of the rows of each block."""
+        total: Array = np.sum(self.each_block(function), axis=0)
+        return total
+
     def part(self, window: range) -> AnalysedLog:
         """Return the rows in a window as a flight of their own."""
         if window == range(self.log.ticks):
@@ -221,3 +221,71 @@ class AnalysedLog:
         if "attitude_error" not in self.values:
             self.values["attitude_error"] = attitude_error(self.log)
         return self.values["attitude_error"][start:stop]
+
+
+def load_bag(
+    path: str | Path, remap: Mapping[str, str] | None = None, namespace: str | None = None
+) -> FlightLog:
+    """Read a recorded flight as NumPy arrays, one row a tick.
+
+    Some of its fields, for N ticks and n joints:
+
+    - ``time`` (N,) s, simulated
+    - ``quaternion`` (N, 4) ``[w, x, y, z]``, the base's attitude in the inertial frame
+    - ``angular_velocity`` (N, 3) rad/s, in the base frame
+    - ``base_position`` (N, 3) m and ``base_velocity`` (N, 3) m/s, in the inertial frame
+    - ``joint_positions`` (N, n) rad and ``joint_velocities`` (N, n) rad/s
+    - ``applied_torque`` (N, n+3) N m over the interval that ended at the tick: base x, y, z in the
+      base frame, then the joints
+    - ``commanded_torque`` (N, n+3) N m, the answer to the tick; None if not recorded
+    - ``reference_joints`` (N, 3, n) desired position, velocity, acceleration: rad, rad/s, rad/s2
+    - ``reference_base`` (N, 10) desired quaternion ``[w, x, y, z]``, angular velocity rad/s and
+      acceleration rad/s2, in the base frame
+    - ``joint_names``, and ``description``: what was flown (controller, case, gains, ...)
+    - ``damage``, ``unfinished``, ``lost``: what is wrong with the bag, empty or zero if nothing.
+      Ticks that could not be read are NaN; ``whole`` (N,) says which are not.
+
+    Args:
+        path: the bag's folder, or a single .mcap or .db3 file.
+        remap: our topic by the bag's, as in ``{"/arm/joint_states": "/joint_states"}``.
+        namespace: of the robot to be read, as ``/sat1``; None: of the only one in the bag.
+
+    Raises:
+        InputError: no bag is there, or no flight in it; one line says why.
+    """
+    return read_flight(as_path(path, "path"), remap, namespace=namespace)
+
+
+ROUNDING = 1e-6
+"""Ticks by which a time may miss the tick it means."""
+
+
+def excerpt(log: FlightLog, from_s: float | None, to_s: float | None) -> FlightLog:
+    """Return the ticks with ``from_s <= t < to_s``, views into the arrays of ``log``.
+
+    What was lost or filled is not known by time: these counts stay those of the whole flight.
+    Unanswered ticks are counted anew where the commands are known.
+
+    Without ``from_s`` from its start, without ``to_s`` to its end; s.
+
+    Raises:
+        InputError: the times are reversed, outside the flight, or hold not one tick.
+    """
+    if from_s is None and to_s is None:
+        return log
+    period = log.timebase.period
+    begin, end = log.first_tick * period, (log.first_tick + log.ticks) * period
+    low, high = begin if from_s is None else from_s, end if to_s is None else to_s
+    times = {"--from": from_s, "--to": to_s}
+    limits = " ".join(f"{name} {value:g}" for name, value in times.items() if value is not None)
+    if low >= high and None not in (from_s, to_s):
+        raise InputError(f"{limits}: the start must come before the end")
+    if not (begin - ROUNDING * period <= low < end and begin < high <= end + ROUNDING * period):
+        raise InputError(f"{limits}: outside the flight, which lasts from {begin:g} to {end:g} s")
+    first, stop = (math.ceil(t / period - ROUNDING) - log.first_tick for t in (low, high))
+    if first >= stop:
+        raise InputError(f"{limits}: no tick lies between (one every {period:g} s)")
+    cut = log.rows(first, stop)
+    if cut.commanded_torque is not None:
+        cut.unanswered = int(np.count_nonzero(np.isnan(cut.commanded_torque[:, 0])))
+    return cut

@@ -3,11 +3,12 @@
 A flight in this process has its resolved scenario, a bag the numbers. A description without them,
 as of another recorder, is taken at its names' word: the robot and case of that name here and now.
 Files and modules that it names are opened only if the log is trusted (`FlightLog.trusted`).
+What is not described, not here, or cannot be raises `InputError`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -30,7 +31,6 @@ from space_robot_sim.environment.captures import Captures
 from space_robot_sim.environment.disturbance_table import JSON
 from space_robot_sim.environment.environment import EnvironmentSettings, with_payload
 from space_robot_sim.environment.events import Event, named_targets, parse_events
-from space_robot_sim.environment.orbit import OrbitSettings
 from space_robot_sim.plant.settings import PlantNodeSettings
 
 from ..flight.start_step import StartStep
@@ -58,7 +58,7 @@ class TorqueLimits(NamedTuple):
     base: float
     joint: float
 
-    def of_axes(self, axes: int) -> Array:
+    def each_axis(self, axes: int) -> Array:
         """Return the limit of each axis, (m,) N m."""
         return np.array([self.base] * 3 + [self.joint] * (axes - 3))
 
@@ -68,20 +68,15 @@ NO_LIMITS = TorqueLimits(np.inf, np.inf)
 
 def start_step_of(log: FlightLog) -> dict[str, Any] | None:
     """Return the `StartStep` that the flight began with; None: none is described."""
-    step = log.flight.get("start_step")
-    zero = StartStep()._asdict()
+    step, zero = log.flight.get("start_step"), StartStep()._asdict()
     if not isinstance(step, dict):
         return None
     known = {key: step.get(key) for key in zero}
-    return known if all(type(known[key]) is type(value) for key, value in zero.items()) else None
+    return known if [*map(type, known.values())] == [*map(type, zero.values())] else None
 
 
 def robot_of(log: FlightLog) -> Robot:
-    """Build the robot that was flown.
-
-    Raises:
-        InputError: it is not described, not here, or not that of the bag's joints.
-    """
+    """Build the robot that was flown."""
     if log.scenario is not None:
         robot: Robot = log.scenario.robots.plant
         return robot
@@ -98,11 +93,7 @@ def robot_of(log: FlightLog) -> Robot:
 
 
 def assumed_robot_of(log: FlightLog) -> Robot:
-    """Build the robot that the flight software assumed: the one that was flown, if none is named.
-
-    Raises:
-        InputError: see `robot_of`.
-    """
+    """Build the robot that the flight software assumed: if none is named, the one that flew."""
     if log.scenario is not None:
         robot: Robot = log.scenario.robots.controller
         return robot
@@ -112,63 +103,34 @@ def assumed_robot_of(log: FlightLog) -> Robot:
 
 
 def check_joints(robot: Robot, log: FlightLog) -> None:
-    """Check that a robot has the joints of a bag.
-
-    Raises:
-        NotDescribedError: it has others.
-    """
+    """Check that a robot has the joints of a bag; NotDescribedError: it has others."""
     if (robot.joint_names, robot.passive_names) != (log.joint_names, log.passive_names):
-        own = shortened(", ".join(robot.all_joint_names), MOST_LETTERS)
-        of_bag = shortened(", ".join((*log.joint_names, *log.passive_names)), MOST_LETTERS)
-        raise NotDescribedError(f"robot {robot.name!r} has the joints {own}, the bag {of_bag}")
+        recorded = _listed((*log.joint_names, *log.passive_names))
+        own = _listed(robot.all_joint_names)
+        raise NotDescribedError(f"robot {robot.name!r} has the joints {own}, the bag {recorded}")
+
+
+def _listed(names: Sequence[str]) -> str:
+    return shortened(", ".join(names) or "none", MOST_LETTERS)
 
 
 def torque_limits(log: FlightLog) -> TorqueLimits:
-    """Find the limits that the plant clipped the torques to.
-
-    Raises:
-        InputError: not even the case is named, or it is not here.
-    """
-    settings = _plant_settings(log)
+    """Find the limits that the plant clipped the torques to; raises as `plant_settings`."""
+    settings = plant_settings(log)
     base, joint = settings.base_torque_limit, settings.joint_torque_limit
     if base_actuators_of(log).base_actuation != IDEAL:
         base = 0.0  # hardware has limits of its own
     return TorqueLimits(base or np.inf, joint or np.inf)
 
 
-def environment_of(log: FlightLog) -> EnvironmentSettings:
-    """Return the environment of the flight.
-
-    Raises:
-        InputError: not even the case is named, or it is not here.
-    """
-    return _plant_settings(log)
-
-
-def orbit_of(log: FlightLog) -> OrbitSettings:
-    """Return the orbital environment of the flight; see its ``has_orbit``.
-
-    Raises:
-        InputError: not even the case is named, or it is not here.
-    """
-    return _plant_settings(log)
-
-
 def captures_of(log: FlightLog) -> Captures:
-    """Return the captures and releases of the robot that flew, from the first rows ``log`` on.
-
-    Raises:
-        InputError: the robot or its environment are not known, or whether a target was reached.
-    """
-    settings = _plant_settings(log)
+    """Return the captures and releases of the robot that flew, from the first rows ``log`` on."""
+    settings = plant_settings(log)
     robot = with_payload(robot_of(log), settings.payload)
     if robot.geared_names != log.geared_names:
-        own, of_bag = (
-            ", ".join(names) or "none" for names in (robot.geared_names, log.geared_names)
-        )
         raise NotDescribedError(
-            f"robot {robot.name!r} has gears in the joints {shortened(own, MOST_LETTERS)}, the bag "
-            f"has motors of {shortened(of_bag, MOST_LETTERS)}"
+            f"robot {robot.name!r} has gears in the joints {_listed(robot.geared_names)}, the bag "
+            f"has motors of {_listed(log.geared_names)}"
         )
     captures = Captures(events_of(log), robot, log.timebase.period, settings)
     for exchange in captures.exchanges:
@@ -181,11 +143,7 @@ def captures_of(log: FlightLog) -> Captures:
 
 
 def events_of(log: FlightLog) -> list[Event]:
-    """Return the captures and releases, by time.
-
-    Raises:
-        InputError: what the bag tells cannot be, or names a file and the bag is not trusted.
-    """
+    """Return the captures and releases, by time."""
     if log.scenario is not None:
         events: list[Event] = log.scenario.plant.parsed_events
         return events
@@ -215,7 +173,8 @@ def event_times(log: FlightLog) -> Array:
     return times
 
 
-def _plant_settings(log: FlightLog) -> PlantNodeSettings:
+def plant_settings(log: FlightLog) -> PlantNodeSettings:
+    """Return what the plant was told: its environment, orbit, actuators and limits."""
     if log.scenario is not None:
         settings: PlantNodeSettings = log.scenario.plant
         return settings
@@ -236,9 +195,18 @@ def _plant_settings(log: FlightLog) -> PlantNodeSettings:
 
 def sensors_of(log: FlightLog) -> str:
     """Return the name of the sensors, as far as the bag records it."""
+    return _recorded_name(log, PlantNodeSettings.node, "sensors") or IDEAL
+
+
+def navigation_of(log: FlightLog) -> str:
+    """Return the name of the navigation, as far as the bag records it."""
+    return _recorded_name(log, ControllerNodeSettings.node, "navigation") or DIRECT
+
+
+def _recorded_name(log: FlightLog, node: str, key: str) -> str:
     if log.scenario is not None:
-        return str(log.scenario.plant.sensors) or IDEAL
-    return str(parameters_of(log, PlantNodeSettings.node).get("sensors", "")) or IDEAL
+        return str(getattr(getattr(log.scenario, node), key))
+    return str(parameters_of(log, node).get(key, ""))
 
 
 def actuators_of(log: FlightLog) -> str:
@@ -247,11 +215,7 @@ def actuators_of(log: FlightLog) -> str:
 
 
 def base_actuators_of(log: FlightLog) -> BaseActuatorSettings:
-    """Return the base's actuators: ideal ones if the bag records none.
-
-    Raises:
-        InputError: what the bag tells cannot be.
-    """
+    """Return the base's actuators: ideal ones if the bag records none."""
     if log.scenario is not None:
         actuators: BaseActuatorSettings = log.scenario.plant
         return actuators
@@ -260,11 +224,7 @@ def base_actuators_of(log: FlightLog) -> BaseActuatorSettings:
 
 
 def flown_actuators(log: FlightLog) -> BaseActuatorSettings:
-    """Return `base_actuators_of` a flight, whose robot and columns they fit.
-
-    Raises:
-        InputError: they do not, or the robot is not known.
-    """
+    """Return `base_actuators_of` a flight, whose robot and columns they fit."""
     actuators = base_actuators_of(log)
     if actuators.base_actuation == "hardware":
         actuators.check(robot_of(log), "of the bag")
@@ -275,13 +235,6 @@ def flown_actuators(log: FlightLog) -> BaseActuatorSettings:
             f"thrusters, and has the states of {counts[0]} and {counts[1]}"
         )
     return actuators
-
-
-def navigation_of(log: FlightLog) -> str:
-    """Return the name of the navigation, as far as the bag records it."""
-    if log.scenario is not None:
-        return str(log.scenario.controller.navigation) or DIRECT
-    return str(parameters_of(log, ControllerNodeSettings.node).get("navigation", "")) or DIRECT
 
 
 def check_files(log: FlightLog, parameters: Mapping[str, Any]) -> None:

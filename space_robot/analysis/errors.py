@@ -1,8 +1,9 @@
-"""Tracking error of a flight, and the groups of axes that errors and torques are summed up by."""
+"""Tracking error of a flight, its groups of axes, and the waypoints of its reference."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import reduce
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +19,10 @@ Array = NDArray[np.float64]
 AxisIndex = slice | list[int]
 """Some of the n+3 axes, as an index."""
 
+SLOW = 1e-4
+"""Share of the highest desired speed so far below which a waypoint is near."""
+AT_REST = 1e-9
+"""Share of the highest desired speed so far that is no motion."""
 FREE = "nothing turns the base"
 UNAVAILABLE = {
     "attitude": f"{FREE}, so its attitude drifts and is no error",
@@ -61,11 +66,6 @@ def axis_groups(
     return groups
 
 
-def groups_of(log: FlightLog) -> dict[str, AxisIndex]:
-    """Return the `axis_groups` of a flight."""
-    return axis_groups(log.axes - 3, controls_base(log), log.prismatic, log.branches)
-
-
 def error_columns(groups: dict[str, AxisIndex]) -> dict[str, AxisIndex]:
     """Return the axes of each error column of Table V."""
     return {"attitude" if k == "base" else f"joints_{k}": axes for k, axes in groups.items()}
@@ -102,11 +102,9 @@ def attitude_error(log: FlightLog) -> Array:
 
 
 def relative_attitude(first: Array, second: Array) -> Array:
-    """Compute ``first* (x) second`` (N, 4), of quaternions ``[w, x, y, z]``; eta >= 0.
+    """Compute ``first* (x) second`` (N, 4), of quaternions (N, 4) ``[w, x, y, z]``; eta >= 0.
 
-    Args:
-        first: (N, 4 or more) columns after the fourth are ignored.
-        second: (N, 4).
+    Of ``first`` columns after the fourth are ignored.
     """
     error = np.zeros((len(second), 4))
     _relative_attitudes(np.ascontiguousarray(first), np.ascontiguousarray(second), error)
@@ -125,12 +123,6 @@ def attitude_angles(log: FlightLog) -> Array:
     Like `tracking_error` it is that of the desired attitude less the true one.
     """
     angles: Array = -np.degrees(rotation_vectors(attitude_error(log)))
-    return angles
-
-
-def angles_of(eps: Array) -> Array:
-    """Compute rotation vectors (N, 3), deg, of the vector parts (N, 3) of quaternions."""
-    angles: Array = np.degrees(rotation_vectors(quaternions_of(eps)))
     return angles
 
 
@@ -189,19 +181,15 @@ def relative_rate(log: FlightLog) -> Array:
     return rate
 
 
-def rate(log: FlightLog, error: Array) -> Array:
-    """(N, m) ``rhodot = [J0(q_e) omega_e, thetadot]`` (22), with J0 of (1).
+def mean_acceleration(log: FlightLog, error: Array) -> Array:
+    """(N-1, m) mean rhodd over the interval that begins at each tick.
 
+    It is the change of ``rhodot = [J0(q_e) omega_e, thetadot]`` (22), with J0 of (1).
     ``error``: (N, 4) q_e, here and below.
     """
     omega, eta, eps = relative_rate(log), error[:, :1], error[:, 1:]
     epsdot = 0.5 * (eta * omega + np.cross(eps, omega))
-    return np.hstack([epsdot, log.joint_velocities])
-
-
-def mean_acceleration(log: FlightLog, error: Array) -> Array:
-    """(N-1, m) mean rhodd over the interval that begins at each tick."""
-    return np.diff(rate(log, error), axis=0) / log.timebase.period
+    return np.diff(np.hstack([epsdot, log.joint_velocities]), axis=0) / log.timebase.period
 
 
 def applied_force(log: FlightLog, error: Array) -> Array:
@@ -224,3 +212,29 @@ def neglected_force(log: FlightLog, h_bar: Array) -> Array:
     """
     error = continuous_error(log)
     return applied_force(log, error) - h_bar * mean_acceleration(log, error)
+
+
+def waypoint_ticks(log: FlightLog) -> NDArray[np.intp]:
+    """Return the rows at which all desired joint velocities vanish; both ends of a longer rest.
+
+    Where none is exactly 0 at a tick, the slowest one counts. Of an arm that never moves it is the
+    first row.
+    """
+    speed: Array = reduce(np.maximum, (np.abs(own) for own in log.reference_joints[:, 1].T))
+    highest = np.fmax.accumulate(speed)
+    if not len(speed) or not highest[-1] > 0.0:
+        return np.array([0])
+    slow, rests = speed <= SLOW * highest, speed <= AT_REST * highest
+    edges = np.flatnonzero(np.diff(slow.astype(np.int8), prepend=0, append=0))
+    waypoints: list[int] = []
+    for begin, end in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
+        resting = begin + np.flatnonzero(rests[begin:end])
+        slowest = begin + int(np.argmin(speed[begin:end]))
+        waypoints += [int(resting[0]), int(resting[-1])] if len(resting) else [slowest]
+    return np.unique(np.array(waypoints, dtype=np.intp))
+
+
+def junction_ticks(log: FlightLog) -> NDArray[np.intp]:
+    """Waypoints inside the flight, where a motion has ended and another begins."""
+    ticks = waypoint_ticks(log)
+    return ticks[(ticks > 0) & (ticks < log.ticks - 1)]

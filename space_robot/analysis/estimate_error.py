@@ -97,11 +97,11 @@ def errors_of(
 class PairFilter:
     """``N_hat`` as the controller forms it of force and acceleration, interval after interval.
 
-    It is linear, so that it may be formed of both before h_bar is known.
+    It is linear, so that it may be formed of both before h_bar is known. Arguments as in
+    `errors_of`.
     """
 
     def __init__(self, smoothing: float = 0.0, rest: bool = True) -> None:
-        """Arguments as in `errors_of`."""
         self._smoothing, self._rest = smoothing, rest
         self._state: Array | None = None
         self._stop, self._last = 0, np.empty(0)
@@ -147,11 +147,7 @@ def _unknown(log: FlightLog) -> str:
 
 
 def smoothing_of(log: FlightLog) -> float:
-    """Return the weight of a new pair in the low-pass of the laws' time-delay estimate; 0: none.
-
-    Raises:
-        InputError: the laws are not recorded, or their estimate is not of the states measured.
-    """
+    """Return the weight of a new pair in the low-pass of the laws' time-delay estimate; 0: none."""
     if navigation_of(log) != DIRECT:
         raise InputError("the filtered states that N_hat is formed of are not recorded")
     if not log.laws:

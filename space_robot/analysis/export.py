@@ -43,11 +43,7 @@ METADATA_KEY = b"space_robot"
 
 
 def dataframe(log: FlightLog) -> DataFrame:
-    """Return the columns, a row a tick; NaN is a number that is not known.
-
-    Raises:
-        InputError: pandas is not installed.
-    """
+    """Return the columns, a row a tick; NaN is a number that is not known."""
     try:
         import pandas as pd
     except ImportError:
@@ -60,21 +56,13 @@ def dataframe(log: FlightLog) -> DataFrame:
 
 
 def check_parquet() -> None:
-    """Check that Parquet files can be written, before any work is done for them.
-
-    Raises:
-        InputError: pyarrow is not installed.
-    """
+    """Check that Parquet files can be written, before any work is done for them."""
     if find_spec("pyarrow") is None:
         raise InputError(f"Parquet files need pyarrow: {install_command('parquet')}")
 
 
 def write_csv(log: FlightLog, path: Path) -> None:
-    """Write the columns as text; a number that is not known is empty.
-
-    Raises:
-        InputError: the file exists or cannot be written.
-    """
+    """Write the columns as text; a number that is not known is empty."""
     with csv_writer(path) as writer:
         writer.writerow(column_names(log))
         for ticks, numbers in batches(log):
@@ -82,11 +70,7 @@ def write_csv(log: FlightLog, path: Path) -> None:
 
 
 def write_parquet(log: FlightLog, path: Path) -> None:
-    """Write the columns; the schema's metadata describes the flight.
-
-    Raises:
-        InputError: the file exists or cannot be written, or pyarrow is not installed.
-    """
+    """Write the columns; the schema's metadata describes the flight."""
     check_parquet()
     import pyarrow as pa
     from pyarrow import parquet
@@ -131,36 +115,38 @@ def _ticks(log: FlightLog) -> NDArray[np.int64]:
 
 def _columns(log: FlightLog) -> Iterator[tuple[list[str], Array]]:
     """Yield names and values (N, K) of columns that belong together."""
-    joints, lengths = log.joint_names, log.prismatic
-    torques = [*["n_m"] * 3, *("n" if slides else "n_m" for slides in lengths[: len(joints)])]
-    axes = [*_each("base", XYZ), *joints]
+    sliding = log.flight.get("prismatic_joints", ())
+    joints, axes = log.joint_names, [*_each("base", XYZ), *log.joint_names]
+
+    def each_joint(what: str, names: Sequence[str], per: str = "") -> list[str]:
+        units = ["m" if name in sliding else "rad" for name in names]
+        return [f"{what.format(n)}_{unit}{per}" for n, unit in zip(names, units, strict=True)]
+
+    def each_torque(what: str) -> list[str]:
+        return [f"{what}_{axis}_{'n' if axis in sliding else 'n_m'}" for axis in axes]
+
     error, q_d, joints_d = tracking_error(log), log.reference_base, log.reference_joints
     yield ["time_s"], (_ticks(log) * log.timebase.period_ns / 1e9)[:, np.newaxis]
     yield _each("base_position", XYZ, "m"), log.base_position
     yield _each("q", WXYZ), log.quaternion
     yield _each("base_velocity", XYZ, "m_s"), log.base_velocity
     yield _each("omega_base", XYZ, "rad_s"), log.omega_base
-    for names, slides, positions, velocities in (
-        (joints, lengths, log.joint_positions, log.joint_velocities),
-        (log.passive_names, lengths[len(joints) :], log.passive_positions, log.passive_velocities),
-    ):
-        yield _joint_columns("{}_position", names, slides), positions
-        yield _joint_columns("{}_velocity", names, slides, "_s"), velocities
-    yield _with_units("applied_torque", axes, torques), log.applied_torque
+    yield each_joint("{}_position", joints), log.joint_positions
+    yield each_joint("{}_velocity", joints, "_s"), log.joint_velocities
+    yield each_joint("{}_position", log.passive_names), log.passive_positions
+    yield each_joint("{}_velocity", log.passive_names, "_s"), log.passive_velocities
+    yield each_torque("applied_torque"), log.applied_torque
     if (measured := log.measured) is not None:
         yield _each("measured_q", WXYZ), measured.quaternion
         yield _each("measured_omega_base", XYZ, "rad_s"), measured.omega_base
-        yield _joint_columns("measured_position_{}", joints, lengths), measured.joint_positions
-        yield (
-            _joint_columns("measured_velocity_{}", joints, lengths, "_s"),
-            measured.joint_velocities,
-        )
-        yield _with_units("reported_torque", axes, torques), measured.applied_torque
+        yield each_joint("measured_position_{}", joints), measured.joint_positions
+        yield each_joint("measured_velocity_{}", joints, "_s"), measured.joint_velocities
+        yield each_torque("reported_torque"), measured.applied_torque
     if log.assumed_error is not None:
         yield _each("assumed_error_q", XYZ), log.assumed_error[:, :3]
-        yield _joint_columns("assumed_error_{}", joints, lengths), log.assumed_error[:, 3:]
+        yield each_joint("assumed_error_{}", joints), log.assumed_error[:, 3:]
     if log.commanded_torque is not None:
-        yield _with_units("commanded_torque", axes, torques), log.commanded_torque
+        yield each_torque("commanded_torque"), log.commanded_torque
     wheels, thrusters = log.wheel_velocities.shape[1], log.thrusts.shape[1]
     torquers = max(0, log.actuator_commands.shape[1] - wheels - thrusters)
     yield _numbered("wheel_velocity", wheels, "rad_s"), log.wheel_velocities
@@ -178,14 +164,13 @@ def _columns(log: FlightLog) -> Iterator[tuple[list[str], Array]]:
     yield _each("reference_q", WXYZ), q_d[:, :4]
     yield _each("reference_omega_base", XYZ, "rad_s"), q_d[:, 4:7]
     yield _each("reference_omega_base_rate", XYZ, "rad_s2"), q_d[:, 7:]
-    for k, (number, per) in enumerate(
-        (("position", ""), ("velocity", "_s"), ("acceleration", "_s2"))
-    ):
-        yield _joint_columns(f"reference_{{}}_{number}", joints, lengths, per), joints_d[:, k]
+    yield each_joint("reference_{}_position", joints), joints_d[:, 0]
+    yield each_joint("reference_{}_velocity", joints, "_s"), joints_d[:, 1]
+    yield each_joint("reference_{}_acceleration", joints, "_s2"), joints_d[:, 2]
     if controls_base(log):
         yield _each("error_q", XYZ), error[:, :3]
         yield _each("error_base", XYZ, "deg"), attitude_angles(log)
-    yield _joint_columns("error_{}", joints, lengths), error[:, 3:]
+    yield each_joint("error_{}", joints), error[:, 3:]
     for name, declared in signals_of(StateSignals).items():
         values = getattr(log, name)
         if name not in NAMED_ABOVE and values.shape[1]:
@@ -200,18 +185,6 @@ def _further(name: str, declared: Signal, log: FlightLog, unit: str) -> list[str
     if declared.size in (1, 3):
         return _each(name, XYZ if declared.size == 3 else [""], unit)
     return _each("", declared.labels, unit)
-
-
-def _joint_columns(
-    what: str, joints: Sequence[str], slides: Sequence[bool], per: str = ""
-) -> list[str]:
-    """Return a name a joint, with its unit: rad, or m of one that slides, ``per`` a time."""
-    units = ("m" if is_prismatic else "rad" for is_prismatic in slides)
-    return [f"{what.format(joint)}_{unit}{per}" for joint, unit in zip(joints, units, strict=False)]
-
-
-def _with_units(what: str, axes: Sequence[str], units: Sequence[str]) -> list[str]:
-    return [f"{what}_{axis}_{unit}" for axis, unit in zip(axes, units, strict=True)]
 
 
 def _numbered(what: str, count: int, unit: str) -> list[str]:

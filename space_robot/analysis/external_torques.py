@@ -18,7 +18,7 @@ from space_robot_sim.environment.captures import Captures
 from space_robot_sim.environment.disturbance import DisturbanceSettings, LoadSchedule
 
 from .analysed_log import AnalysedLog
-from .described import captures_of, environment_of
+from .described import captures_of, plant_settings
 from .series import Definition, TimeSeries, series
 
 Array = NDArray[np.float64]
@@ -66,11 +66,8 @@ def torques_by_source(log: FlightLog) -> dict[str, Callable[[int, int], Array]]:
     """Return a function from rows to the torque (N, 3) of each source after each tick, N m.
 
     Inertial axes, about the common centre of mass, over the interval after the tick.
-
-    Raises:
-        InputError: the environment is not known.
     """
-    settings = environment_of(log).disturbance
+    settings = plant_settings(log).disturbance
     captures = captures_of(log) if settings.table else None
     torques: dict[str, Callable[[int, int], Array]] = {}
     for k, name in enumerate(SOURCES):

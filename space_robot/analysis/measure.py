@@ -23,7 +23,6 @@ from .series import GROUPS, Definition, MetricGroup, SeriesGroup, pattern
 MODULES = (
     "pointing",
     "torques",
-    "waypoints",
     "actuation",
     "estimate_error",
     "tool_path",
@@ -89,15 +88,14 @@ def evaluate(
     flight: AnalysedLog, wanted: Collection[str] | None = None, window: Window | None = None
 ) -> tuple[dict[str, float], dict[str, str]]:
     """Return metrics as `measure` does, and why there are none, by name of the group."""
-    rows = (window or Window()).ticks(flight.log.first_tick + flight.log.ticks, flight.period)
     first = flight.log.first_tick
-    rows = range(max(rows.start - first, 0), max(rows.stop - first, 0))
+    ticks = (window or Window()).ticks(first + flight.log.ticks, flight.period)
+    rows = range(max(ticks.start - first, 0), max(ticks.stop - first, 0))
     if not rows:
         return {}, {}
     numbers: dict[str, float] = {}
     unavailable: dict[str, str] = {}
-    groups = GROUPS.values() if wanted is None else _groups_of(wanted)
-    for group in groups:
+    for group in _groups_of(wanted):
         try:
             numbers |= group.evaluate(flight, rows)
         except InputError as error:
@@ -107,19 +105,16 @@ def evaluate(
     return numbers, unavailable
 
 
-def _groups_of(wanted: Collection[str]) -> list[MetricGroup]:
-    """Return the groups of metrics by name.
-
-    Raises:
-        InputError: there is no such metric.
-    """
+def _groups_of(wanted: Collection[str] | None) -> Collection[MetricGroup]:
+    if wanted is None:
+        return GROUPS.values()
     groups = {}
     for name in wanted:
         if (group := group_of(name)) is None:
             one_of(name, [template for _, template, _ in all_metrics()], "metric")
         else:
             groups[group.name] = group
-    return list(groups.values())
+    return groups.values()
 
 
 def names(flight: AnalysedLog, groups: Iterable[str] | None = None) -> Iterator[str]:
@@ -142,21 +137,22 @@ def all_metrics() -> Iterator[tuple[MetricGroup, str, Definition]]:
 
 
 @lru_cache(maxsize=4096)
+def _registered(name: str) -> tuple[MetricGroup | None, Definition]:
+    for group, template, quantity in all_metrics():
+        if fnmatchcase(name, pattern(template)):
+            unit = quantity.unit.replace("{unit}", column_unit(name))
+            return group, quantity._replace(unit=unit)
+    return None, Definition("", "")
+
+
 def group_of(name: str) -> MetricGroup | None:
     """Return the group of a metric; None: there is none, as of a user's own."""
-    matching = (
-        group for group, template, _ in all_metrics() if fnmatchcase(name, pattern(template))
-    )
-    return next(matching, None)
+    return _registered(name)[0]
 
 
-@lru_cache(maxsize=4096)
 def describe(name: str) -> Definition:
     """Return unit and meaning of a metric; of an unknown one, such as a user's own, none."""
-    for _, template, quantity in all_metrics():
-        if fnmatchcase(name, pattern(template)):
-            return quantity._replace(unit=quantity.unit.replace("{unit}", column_unit(name)))
-    return Definition("", "")
+    return _registered(name)[1]
 
 
 @lru_cache(maxsize=4096)

@@ -52,24 +52,11 @@ class PlannedSegment(NamedTuple):
     """The same with a free base: 0 in a dynamic singularity."""
 
     @property
-    def of_base(self) -> SourceDemand:
+    def whole_demand(self) -> SourceDemand:
         """What the base's actuators give, whatever the source."""
         stored = self.demand.stored_momentum
         torque = float(np.max(self.demand.base_torque))
         return SourceDemand(torque, float(stored.max()), float(stored[-1]))
-
-
-class Feasibility(NamedTuple):
-    """Whether actuators of the base give what a mission asks for."""
-
-    actuators: str
-    is_feasible: bool
-    torque: float
-    """Largest torque asked, as a share of what they give in that direction."""
-    momentum: float
-    """Largest momentum asked, as a share of what they hold; 0: they need not hold any."""
-    complaint: str
-    """What is asked too much, where and when; empty: nothing is."""
 
 
 def planned_segments(
@@ -85,18 +72,14 @@ def planned_segments(
         mission: the plan.
         orbit: with the torques from outside; None: there are none.
         start_rate: see `mission_demand`.
-
-    Raises:
-        InputError: it has no segments.
     """
     if not mission.duration:
         raise InputError("the mission has no motion to plan: no segments")
-    nominal = robot.nominal
     demands = mission_demand(robot, mission.pieces, orbit or OrbitSettings(), start_rate)
-    return [_planned(asked, nominal) for asked in demands]
+    return [_with_postures(piece_demand, robot.nominal) for piece_demand in demands]
 
 
-def _planned(piece_demand: PieceDemand, robot: Robot) -> PlannedSegment:
+def _with_postures(piece_demand: PieceDemand, robot: Robot) -> PlannedSegment:
     asked = piece_demand.asked
     rows = np.unique(np.linspace(0, len(asked.time) - 1, POSTURES).astype(int))
     tools = [tool_state(robot, asked.base[k, :4], asked.joints[k, 0]) for k in rows]
@@ -113,23 +96,25 @@ def _smallest(jacobian: Array, lever: Array) -> float:
     return float(np.linalg.svd(scaled, compute_uv=False)[-1])
 
 
-def feasibility(
+def _judged_actuators(
     robot: Robot, segments: Sequence[PlannedSegment], chosen: Mapping[str, BaseActuatorSettings]
-) -> list[Feasibility]:
-    """Return whether actuators give what a mission asks for: the chosen ones, and those shipped."""
-    sets = {name: hardware for name, hardware in chosen.items() if _is_limited(hardware)}
+) -> list[dict[str, Any]]:
+    sets = dict(chosen)
     for file in sorted((config_directory() / "actuators").glob("*.yaml")):
         with suppress(InputError):  # not for this robot
             hardware = assumed_actuators(file.stem, robot)
-            if _is_limited(hardware) and hardware not in sets.values():
+            if hardware not in sets.values():
                 sets[file.stem] = hardware
     demands = [PieceDemand(*segment[:3]) for segment in segments]
-    judged = ((name, excess(hardware, demands)) for name, hardware in sets.items())
-    return [Feasibility(name, not of.complaint, *of) for name, of in judged]
-
-
-def _is_limited(hardware: BaseActuatorSettings) -> bool:
-    return hardware.base_actuation == "hardware"
+    judged = {
+        name: excess(hardware, demands)
+        for name, hardware in sets.items()
+        if hardware.base_actuation == "hardware"
+    }
+    return [
+        {"actuators": name, "is_feasible": not most.complaint, **most._asdict()}
+        for name, most in judged.items()
+    ]
 
 
 def plan_report(
@@ -139,32 +124,26 @@ def plan_report(
 ) -> dict[str, Any]:
     """Return the plan as numbers and texts: segments, demands, limits, actuators.
 
-    Args:
-        robot: as the flight software knows it.
-        segments: of its mission.
-        chosen: actuators to be judged before those shipped, by name; ``refused`` says what the
-            mission asks too much of them.
+    The robot is as the flight software knows it. ``chosen``: actuators to be judged before those
+    shipped, by name; ``refused`` says what the mission asks too much of them.
     """
     chosen = chosen or {}
-    judged = feasibility(robot, segments, chosen)
-    by_source = {
-        name: _over_all([segment.sources[name] for segment in segments])
-        for name in segments[0].sources
-    }
+    judged = _judged_actuators(robot, segments, chosen)
+    sources = segments[0].sources
     return {
         "duration_s": segments[-1].piece.end,
-        **_over_all([segment.of_base for segment in segments])._asdict(),
-        "sources": {name: of._asdict() for name, of in by_source.items()},
+        **_over_all([segment.whole_demand for segment in segments]),
+        "sources": {name: _over_all([s.sources[name] for s in segments]) for name in sources},
         "segments": [_row(robot, number, s) for number, s in enumerate(segments, 1)],
         "joints": joint_margins(robot, [segment.demand for segment in segments]),
-        "actuators": [of._asdict() for of in judged],
-        "refused": "; ".join(of.complaint for of in judged if of.actuators in chosen),
+        "actuators": judged,
+        "refused": "; ".join(j["complaint"] for j in judged if j["actuators"] in chosen),
     }
 
 
-def _over_all(demands: Sequence[SourceDemand]) -> SourceDemand:
+def _over_all(demands: Sequence[SourceDemand]) -> dict[str, float]:
     torque, momentum, ends = zip(*demands, strict=True)
-    return SourceDemand(max(torque), max(momentum), ends[-1])
+    return SourceDemand(max(torque), max(momentum), ends[-1])._asdict()
 
 
 def _row(robot: Robot, number: int, segment: PlannedSegment) -> dict[str, Any]:
@@ -175,8 +154,8 @@ def _row(robot: Robot, number: int, segment: PlannedSegment) -> dict[str, Any]:
         "motion": piece.motion,
         "begin_s": piece.begin,
         "duration_s": piece.end - piece.begin,
-        **segment.of_base._asdict(),
-        "sources": {name: of._asdict() for name, of in segment.sources.items()},
+        **segment.whole_demand._asdict(),
+        "sources": {name: demand._asdict() for name, demand in segment.sources.items()},
         "joint_rates": dict(zip(robot.joint_names, rates.tolist(), strict=True)),
         "goal_deg": robot.to_degrees(piece.goal).tolist(),
         "attitude": piece.attitude.tolist(),
@@ -187,15 +166,10 @@ def _row(robot: Robot, number: int, segment: PlannedSegment) -> dict[str, Any]:
 
 
 def joint_margins(robot: Robot, demands: Sequence[MotionDemand]) -> dict[str, Any]:
-    """Return the joints that come nearest to their limits of position, velocity and effort.
+    """Return the joints that come nearest to their limits in a mission, by the kind of limit.
 
-    Args:
-        robot: with limits of its joints.
-        demands: of the segments of a mission.
-
-    Returns:
-        By kind of limit ``joint``, ``time_s`` and ``share``: 1 at the limit; positions count from
-        the middle of the joint's range. A kind that no joint has a limit of is missing.
+    Each is ``joint``, ``time_s`` and ``share``: 1 at the limit; positions count from the middle of
+    the joint's range. A kind that no joint has a limit of is missing.
     """
     time = np.concatenate([part.time for part in demands])
     joints = np.concatenate([part.joints for part in demands])
@@ -278,12 +252,8 @@ def lightened_mission(
     """Return a mission that asks less of the base in the same time.
 
     Legs of the joints get the bends of `best_bends`, tools are led with ``least: momentum``.
-
-    Args:
-        robot: as the flight software knows it.
-        mission: the plan.
-        settings: of the mission.
-        of_torque: whether the largest torque is to fall; else the largest momentum.
+    ``robot`` is as the flight software knows it; ``of_torque``: whether the largest torque is to
+    fall, else the largest momentum.
     """
     segments = []
     for text, piece in zip(settings.written_segments, mission.pieces, strict=True):
@@ -336,11 +306,8 @@ def best_bends(
 ) -> tuple[list[list[float]], float]:
     """Return bends in degrees (m for prismatic joints), and what is left of the demand, as a share.
 
-    Args:
-        robot: as the flight software knows it.
-        leg: a leg, whose own bends do not count.
-        base: course of the base during the leg.
-        of_torque: whether the largest torque on the base is to fall; else the largest momentum.
+    The leg's own bends do not count; ``base``: course of the base during the leg; ``of_torque`` as
+    in `lightened_mission`.
     """
     from scipy.optimize import minimize  # slow to import
 

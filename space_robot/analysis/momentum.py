@@ -10,18 +10,19 @@ captured or released target has, and by nothing else.
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from space_robot_model.elementary.matrices import norm, norms, product, unit_rows
+from space_robot_model.elementary.matrices import norms, product, unit_rows
 from space_robot_model.hardware.base_actuators import WheelSettings
 from space_robot_model.robot import Robot
 from space_robot_model.robot.gears import motor_momentum
 from space_robot_model.robot.momentum import Motion, robot_momentum
-from space_robot_model.robot.placements import base_axes, to_inertial
+from space_robot_model.robot.placements import to_inertial
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.samples import SOURCES
 from space_robot_sim.environment.captures import CaptureEvent, Captures
@@ -30,11 +31,22 @@ from space_robot_sim.environment.events import Capture
 from space_robot_sim.environment.impact import Impact
 
 from .analysed_log import AnalysedLog
-from .described import NotDescribedError, captures_of, environment_of, events_of
+from .described import NotDescribedError, captures_of, events_of, plant_settings
 from .external_torques import axes_of, base_loads, torque_about_centre
 from .series import Definition, TimeSeries, metrics, series
 
 Array = NDArray[np.float64]
+
+
+VELOCITIES = (
+    "base_velocity",
+    "omega_base",
+    "joint_velocities",
+    "passive_velocities",
+    "wheel_velocities",
+    "motor_velocities",
+)
+"""Columns of the velocities that a capture changes, in its order."""
 
 
 class Momentum(NamedTuple):
@@ -66,12 +78,8 @@ class MomentumSeries:
     """
 
     def __init__(self, flight: AnalysedLog) -> None:
-        """Begin at the first row.
-
-        Raises:
-            InputError: the robot, its actuators or its environment are not known.
-        """
-        settings = environment_of(flight.log)
+        """Begin at the first row; InputError: robot, actuators or environment are not known."""
+        settings = plant_settings(flight.log)
         if settings.has_orbit and not flight.log.external_torques.shape[1]:
             raise NotDescribedError("the torques that acted in the orbit were not recorded")
         self._log, self.flown = flight.log, flight.actuators
@@ -86,14 +94,13 @@ class MomentumSeries:
             tick - first for tick in self._captures.ticks(first + max(start, 1), first + stop)
         ]
         parts, begin = [], start
-        for row in events:
+        for row in [*events, stop]:
             if begin < row:
                 parts.append(self._piece(max(begin - 1, 0), begin, row))
-            self._exchange(row)
-            parts.append(self._piece(row, row, row + 1))
+            if row < stop:
+                self._exchange(row)
+                parts.append(self._piece(row, row, row + 1))
             begin = row + 1
-        if begin < stop:
-            parts.append(self._piece(max(begin - 1, 0), begin, stop))
         return Momentum(*(np.concatenate(columns) for columns in zip(*parts, strict=True)))
 
     def _piece(self, before: int, begin: int, stop: int) -> Momentum:
@@ -157,8 +164,7 @@ class MomentumSeries:
         if flown.thruster_count or flown.torquer_count:
             thrusters = flown.thrusters
             force = product(rows.thrusts, thrusters.unit_directions)
-            arms = np.cross(thrusters.places, thrusters.unit_directions)
-            about = product(rows.thrusts, arms)
+            about = product(rows.thrusts, np.cross(thrusters.places, thrusters.unit_directions))
             if flown.torquer_count:  # all on the base that is not of the wheels' motors
                 of_wheels = product(rows.wheel_torques, flown.wheels.unit_axes)
                 about = rows.applied_torque[:, :3] + of_wheels
@@ -177,11 +183,7 @@ class MomentumSeries:
 
 
 def momentum_of(log: FlightLog) -> Momentum:
-    """Return the momentum of a whole log.
-
-    Raises:
-        InputError: see `MomentumSeries`.
-    """
+    """Return the momentum of a whole log; raises as `MomentumSeries`."""
     return MomentumSeries(AnalysedLog(log)).of(0, log.ticks)
 
 
@@ -244,8 +246,7 @@ def disturbance_impulse(disturbance: DisturbanceSettings, time: Array) -> Array:
     return impulse
 
 
-def impact_at(exchange: CaptureEvent, row: FlightLog, wheels: WheelSettings) -> Impact:
-    """Return the impact of an event in the configuration of a row."""
+def _impact_at(exchange: CaptureEvent, row: FlightLog, wheels: WheelSettings) -> Impact:
     return exchange.impact(
         unit_rows(row.quaternion)[0],
         row.all_positions[0],
@@ -259,48 +260,31 @@ def happens_in(captures: Captures, exchange: CaptureEvent, row: FlightLog) -> bo
 
     That depends on places alone, so that no wheels are needed.
     """
-    impact = impact_at(exchange, row, WheelSettings())
+    impact = _impact_at(exchange, row, WheelSettings())
     return captures.happens(exchange, impact, row.base_position[0])
 
 
 def state_before(exchange: CaptureEvent, row: FlightLog, wheels: WheelSettings) -> FlightLog:
     """Return the one row of an event's tick with the velocities that led to those it has.
 
-    Args:
-        exchange: the event; of several at one tick the last one.
-        row: the truth at its tick, when it has happened.
-        wheels: of the base.
+    The row is the truth when it has happened; of several events at one tick take the last first.
     """
-    n, p = len(row.joint_names), len(row.passive_names)
-    quaternion = row.quaternion[0] / norm(row.quaternion[0])
-    axes = base_axes(quaternion[:, np.newaxis])[:, :, 0]
-    after = np.concatenate(
-        [
-            row.base_velocity[0],
-            product(row.omega_base[0], axes),
-            row.all_velocities[0],
-            row.wheel_velocities[0],
-            row.motor_velocities[0],
-        ]
-    )
-    before = exchange.velocity_before(impact_at(exchange, row, wheels), after)
-    columns: dict[str, Any] = {
-        "base_velocity": before[:3],
-        "omega_base": product(axes, before[3:6]),
-        "joint_velocities": before[6 : 6 + n],
-        "passive_velocities": before[6 + n : 6 + n + p],
-        "wheel_velocities": before[6 + n + p : 6 + n + p + wheels.count],
-        "motor_velocities": before[6 + n + p + wheels.count :],
-    }
+    axes = axes_of(row)[:, :, 0]
+    columns: dict[str, Any] = {name: getattr(row, name)[0] for name in VELOCITIES}
+    columns["omega_base"] = product(columns["omega_base"], axes)
+    ends = np.cumsum([len(column) for column in columns.values()])[:-1]
+    after = np.concatenate(list(columns.values()))
+    before = exchange.velocity_before(_impact_at(exchange, row, wheels), after)
+    columns = dict(zip(VELOCITIES, np.split(before, ends), strict=True))
+    columns["omega_base"] = product(axes, columns["omega_base"])
     return replace(row, **{name: values[np.newaxis] for name, values in columns.items()})
 
 
 def _has_free_targets(flight: AnalysedLog) -> bool:
-    try:
+    with suppress(ValueError):
         events = events_of(flight.log)
-    except ValueError:
-        return False
-    return any(isinstance(event, Capture) and event.target.is_in_orbit for event in events)
+        return any(isinstance(event, Capture) and event.target.is_in_orbit for event in events)
+    return False
 
 
 @metrics(

@@ -16,7 +16,7 @@ from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
 from inspect import isclass
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, cast
 
 from space_robot_control.laws.names import ENDING, import_named, importable_name
 from space_robot_msgs_py.bag.flight_log import FlightLog
@@ -44,30 +44,16 @@ class OwnMetric(NamedTuple):
     """Name of the function, see `text_of`."""
 
     def value(self, log: FlightLog) -> float:
-        """Return the metric of a flight; it need not be finite.
-
-        Raises:
-            MetricError: the function raised an error, or returned no number.
-            InputError: the function cannot be imported.
-        """
+        """Return the metric of a flight, which need not be finite, or raise InputError."""
         return call(function_of(self.text), log, f"metric {self.name}")
 
     def finite_value(self, log: FlightLog) -> float:
-        """Return the metric of a flight.
-
-        Raises:
-            MetricError: the function raised an error, or returned no finite number.
-            InputError: the function cannot be imported.
-        """
+        """Return the metric of a flight as `value` does; MetricError: it is not finite."""
         return finite_value(function_of(self.text), log, f"metric {self.name}")
 
 
 def call(function: MetricFunction, log: FlightLog, what: str) -> float:
-    """Return what a function returns for a flight, as a float; ``what`` names it in errors.
-
-    Raises:
-        MetricError: it raised an error, or returned no number.
-    """
+    """Return the number of a function for a flight, or raise MetricError, which names ``what``."""
     folder = os.getcwd()
     try:
         value: Any = function(log)
@@ -88,11 +74,7 @@ def call(function: MetricFunction, log: FlightLog, what: str) -> float:
 
 
 def finite_value(function: MetricFunction | str, log: FlightLog, what: str = "") -> float:
-    """Return the metric of a flight, by a function or its name.
-
-    Raises:
-        InputError: the function cannot be imported, raised an error, or returned no finite number.
-    """
+    """Return the finite metric of a flight, by a function or its name; else raise InputError."""
     if isinstance(function, str):
         return OwnMetric(name_of(function), function).finite_value(log)
     if not callable(function):
@@ -104,29 +86,20 @@ def finite_value(function: MetricFunction | str, log: FlightLog, what: str = "")
 
 
 def function_of(text: str) -> MetricFunction:
-    """Return a metric's function by its name.
-
-    Raises:
-        InputError: it cannot be imported, or is no function.
-    """
+    """Return a metric's function by its name; raise InputError if it cannot be imported."""
     if text.startswith(SESSION):
         if text not in _SESSION:
             raise InputError(f"metric {short(text)}: a function of another Python session")
         return _SESSION[text]
     what = f"metric {short(check_text(text))}"
-    function = import_named(text, what, "function", _is_function, ADVICE)
+    function: Any = import_named(text, what, "function", _is_function, ADVICE)
     if not callable(function) or isclass(function):
         raise InputError(f"{what} is no function: {ADVICE}")
-    checked: MetricFunction = function
-    return checked
+    return cast(MetricFunction, function)
 
 
 def check_text(text: str) -> str:
-    """Return the name of a function if it has the form of one; nothing is imported.
-
-    Raises:
-        InputError: it has another form.
-    """
+    """Return a text that has the form of a function's name; raise InputError if it has not."""
     if text.endswith(ENDING):
         raise InputError(f"metric {short(text)}: name the function as well, {text}:FUNCTION")
     module, _, function = text.rpartition(":")
@@ -139,10 +112,7 @@ def text_of(metric: object) -> str:
     """Return the name of a function, given as the function itself or as its name.
 
     It is ``module:FUNCTION`` or ``file.py:FUNCTION`` if another process can import the function
-    by it, else one that begins with `SESSION`.
-
-    Raises:
-        InputError: it is neither a function nor the name of one.
+    by it, else one that begins with `SESSION`. What is neither raises InputError.
     """
     if isinstance(metric, str):
         return check_text(metric)
@@ -165,22 +135,14 @@ def name_of(text: str) -> str:
 
 
 def check_names(names: Iterable[str]) -> None:
-    """Check the names of own metrics: other metrics have a point in their names.
-
-    Raises:
-        InputError: a name is no identifier.
-    """
+    """Raise InputError if a name of an own metric is no identifier: others have a point in it."""
     for name in names:
         if not (name.isidentifier() and name.isascii()):
             raise InputError(f"{short(name)} is no name of a metric: letters, digits and _ only")
 
 
 def parse(text: str) -> OwnMetric:
-    """Parse ``file.py:FUNCTION`` or ``NAME=file.py:FUNCTION``, and import the function.
-
-    Raises:
-        InputError: the name is none, or the function cannot be imported.
-    """
+    """Parse ``file.py:FUNCTION`` or ``NAME=file.py:FUNCTION``, and import it, or InputError."""
     name, sign, function = text.partition("=")
     metric = OwnMetric(name, function) if sign else OwnMetric(name_of(text), text)
     function_of(metric.text)
@@ -198,7 +160,6 @@ def _is_function(value: object) -> bool:
 
 
 def _is_importable(function: Any) -> bool:
-    """Return True if a function is the one of its name in an imported module."""
     module = sys.modules.get(getattr(function, "__module__", None) or "")
     name = getattr(function, "__qualname__", "")
     if module is None or module.__name__ == "__main__" or not name.isidentifier():

@@ -12,7 +12,6 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.config.validation import one_of
@@ -20,7 +19,13 @@ from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.samples import SOURCES
 
 from .analysed_log import ANGLES, AnalysedLog
-from .errors import attitude_angles, attitude_drift, tracking_error
+from .errors import (
+    attitude_angles,
+    attitude_drift,
+    relative_attitude,
+    rotation_vectors,
+    tracking_error,
+)
 from .external_torques import torques_by_source
 from .measure import column_label, column_unit
 from .momentum import Momentum, momentum_of
@@ -65,13 +70,14 @@ class PlottedQuantity(NamedTuple):
 
 
 Quantities = Iterator[PlottedQuantity]
+Plotter = Callable[[AnalysedLog], Quantities]
 
 
 class PlotKind(NamedTuple):
     """Quantities that are chosen together."""
 
     text: str
-    quantities: Callable[[AnalysedLog], Quantities]
+    quantities: Plotter
     figure: str
     """File name of its figure of one flight; empty: there is none."""
     caption: str
@@ -84,19 +90,13 @@ KINDS: dict[str, PlotKind] = {}
 
 def plotted(
     name: str, text: str, figure: str = "", caption: str = ""
-) -> Callable[[Callable[[AnalysedLog], Quantities]], Callable[[AnalysedLog], Quantities]]:
+) -> Callable[[Plotter], Plotter]:
     """Register a function from a flight to quantities; one that the flight lacks raises InputError.
 
-    Args:
-        name: that chooses them.
-        text: for the help.
-        figure: file name of their figure of one flight; empty: none.
-        caption: of the figure.
+    ``name`` chooses them, ``text`` is for the help, the others are as in `PlotKind`.
     """
 
-    def register(
-        function: Callable[[AnalysedLog], Quantities],
-    ) -> Callable[[AnalysedLog], Quantities]:
+    def register(function: Plotter) -> Plotter:
         KINDS[name] = PlotKind(text, function, figure, caption)
         return function
 
@@ -115,11 +115,7 @@ def quantities_of(
 
 
 def parse_kinds(text: str) -> tuple[str, ...]:
-    """Return the names in a list such as ``attitude,wheels``.
-
-    Raises:
-        InputError: one is not of `KINDS`, or there is none.
-    """
+    """Return the names in a list such as ``attitude,wheels``."""
     names = tuple(dict.fromkeys(name.strip() for name in text.split(",") if name.strip()))
     if not names:
         raise InputError(f"--plots: choose of {', '.join(KINDS)}")
@@ -133,10 +129,9 @@ def _attitude(flight: AnalysedLog) -> Quantities:
     log = flight.log
     if flight.controls_base:
         yield PlottedQuantity("attitude error", "deg", AXES, attitude_angles(log), is_error=True)
-        return
-    start = _first(log, ("base_position", "quaternion"))
-    angles = np.degrees(attitude_drift(log, log.quaternion[start]))
-    yield PlottedQuantity("attitude drift", "deg", AXES, angles)
+    else:
+        angles = np.degrees(attitude_drift(log, log.quaternion[_first_known(log)]))
+        yield PlottedQuantity("attitude drift", "deg", AXES, angles)
 
 
 @plotted("joints", "errors of the joints")
@@ -168,8 +163,8 @@ def _tool(flight: AnalysedLog) -> Quantities:
 @plotted("base", "drift of the base's position")
 def _base(flight: AnalysedLog) -> Quantities:
     log = flight.log
-    start = _first(log, ("base_position", "quaternion"))
-    yield PlottedQuantity("base drift", "m", AXES, log.base_position - log.base_position[start])
+    drift = log.base_position - log.base_position[_first_known(log)]
+    yield PlottedQuantity("base drift", "m", AXES, drift)
 
 
 @plotted("rates", "angular velocity of the base")
@@ -179,18 +174,14 @@ def _rates(flight: AnalysedLog) -> Quantities:
 
 @plotted("positions", "positions of the joints")
 def _positions(flight: AnalysedLog) -> Quantities:
-    log = flight.log
-    values, wanted = log.joint_positions, log.reference_joints[:, 0]
-    names, slides = log.joint_names, log.prismatic[: len(log.joint_names)]
-    yield from _by_unit("joint positions", names, slides, values, ("deg", "m"), wanted)
+    values, wanted = flight.log.joint_positions, flight.log.reference_joints[:, 0]
+    yield from _by_unit(flight, "joint positions", values, ("deg", "m"), wanted=wanted)
 
 
 @plotted("velocities", "velocities of the joints")
 def _velocities(flight: AnalysedLog) -> Quantities:
-    log = flight.log
-    values, wanted = log.joint_velocities, log.reference_joints[:, 1]
-    names, slides = log.joint_names, log.prismatic[: len(log.joint_names)]
-    yield from _by_unit("joint velocities", names, slides, values, ("rad/s", "m/s"), wanted)
+    values, wanted = flight.log.joint_velocities, flight.log.reference_joints[:, 1]
+    yield from _by_unit(flight, "joint velocities", values, ("rad/s", "m/s"), wanted=wanted)
 
 
 @plotted(
@@ -201,10 +192,8 @@ def _velocities(flight: AnalysedLog) -> Quantities:
 )
 def _deflection(flight: AnalysedLog) -> Quantities:
     log, robot = flight.log, flight.robot
-    rest = np.array([spring.rest for spring in robot.springs])
-    slides = log.prismatic[len(log.joint_names) :]
-    away = log.passive_positions - rest
-    yield from _by_unit("deflection", log.passive_names, slides, away, is_shown=True)
+    away = log.passive_positions - [spring.rest for spring in robot.springs]
+    yield from _by_unit(flight, "deflection", away, names=log.passive_names, is_shown=True)
     gears = dict(zip(robot.joint_names, robot.gears or (None,) * robot.n, strict=True))
     # what a motor's encoder measured is the motor's position, not the joint's
     known = [
@@ -216,8 +205,7 @@ def _deflection(flight: AnalysedLog) -> Quantities:
     joints = [log.joint_names.index(name) for name in known]
     motors = [log.geared_names.index(name) for name in known]
     away = log.motor_positions[:, motors] - log.joint_positions[:, joints]
-    slides = tuple(log.prismatic[joint] for joint in joints)
-    yield from _by_unit("gear deflection", known, slides, away, is_shown=True)
+    yield from _by_unit(flight, "gear deflection", away, names=known, is_shown=True)
 
 
 @plotted("torques", "torques on base and joints")
@@ -243,10 +231,7 @@ def _wheels(flight: AnalysedLog) -> Quantities:
     with suppress(InputError):
         wheels = flight.actuators.wheels
         is_described = True
-        momenta, torques = (
-            wheels.values("max_momentum").tolist(),
-            wheels.values("max_torque").tolist(),
-        )
+        momenta, torques = (wheels.values(f"max_{k}").tolist() for k in ("momentum", "torque"))
         spin = wheels.spin_momenta(log.wheel_velocities)
         yield PlottedQuantity("wheel momentum", "N m s", names, spin, limits=momenta)
     speed = PlottedQuantity("wheel speed", "rad/s", names, log.wheel_velocities)
@@ -312,21 +297,13 @@ def _estimates(flight: AnalysedLog) -> Quantities:
     log, measured = flight.log, flight.log.measured
     if measured is None:
         return
-    turned = np.full((log.ticks, 3), np.nan)
-    known = np.isfinite(measured.quaternion).all(axis=1) & np.isfinite(log.quaternion).all(axis=1)
-    if known.any():
-        sensed, true = (
-            Rotation.from_quat(q[known], scalar_first=True)
-            for q in (measured.quaternion, log.quaternion)
-        )
-        turned[known] = np.degrees((true.inv() * sensed).as_rotvec())
+    turned = np.degrees(rotation_vectors(relative_attitude(log.quaternion, measured.quaternion)))
     title = "measured less true"
     yield PlottedQuantity(f"{title} attitude", "deg", AXES, turned, is_shown=False)
     rate = measured.omega_base - log.omega_base
     yield PlottedQuantity(f"{title} rate", "rad/s", AXES, rate, is_shown=False)
     away = measured.joint_positions - log.joint_positions
-    slides = log.prismatic[: len(log.joint_names)]
-    yield from _by_unit(f"{title} joints", log.joint_names, slides, away)
+    yield from _by_unit(flight, f"{title} joints", away)
 
 
 @plotted(
@@ -350,13 +327,11 @@ def _orbit(flight: AnalysedLog) -> Quantities:
         yield PlottedQuantity("magnetic field", "T", AXES, log.magnetic_field, is_drawn=False)
 
 
-def _first(log: FlightLog, columns: Sequence[str]) -> int:
-    """Return the first row that has all of the columns; 0 if there is none."""
-    return int(np.argmax(log.finite(columns)))
+def _first_known(log: FlightLog) -> int:
+    return int(np.argmax(log.finite(("base_position", "quaternion"))))
 
 
 def _names(flight: AnalysedLog, axes: slice | list[int]) -> list[str]:
-    """Return the axes of base or joints by their names; those of the base are x, y, z."""
     names: list[str] = np.array([*AXES, *flight.log.joint_names])[axes].tolist()
     return names
 
@@ -377,22 +352,23 @@ def _series(
 
 
 def _by_unit(
+    flight: AnalysedLog,
     title: str,
-    names: Sequence[str],
-    slides: Sequence[bool],
     values: Array,
     units: tuple[str, str] = ("rad", "m"),
+    names: Sequence[str] | None = None,
     wanted: Array | None = None,
     is_shown: bool = False,
 ) -> Quantities:
     """Yield values of joints, those of revolute ones apart from those of prismatic ones."""
-    is_prismatic = np.array(slides, dtype=bool)
-    for chosen, unit in zip((~is_prismatic, is_prismatic), units, strict=True):
-        if chosen.any():
-            labels = np.array(names)[chosen].tolist()
-            own, desired = (
-                None if v is None else np.degrees(v[:, chosen]) if unit == "deg" else v[:, chosen]
-                for v in (values, wanted)
+    names = flight.log.joint_names if names is None else names
+    sliding = flight.log.flight.get("prismatic_joints", ())
+    for unit, is_prismatic in zip(units, (False, True), strict=True):
+        chosen = [k for k, name in enumerate(names) if (name in sliding) == is_prismatic]
+        if chosen:
+            factor = np.degrees(1.0) if unit == "deg" else 1.0
+            desired = None if wanted is None else factor * wanted[:, chosen]
+            labels = [names[k] for k in chosen]
+            yield PlottedQuantity(
+                title, unit, labels, factor * values[:, chosen], desired, is_shown=is_shown
             )
-            assert own is not None
-            yield PlottedQuantity(title, unit, labels, own, desired, is_shown=is_shown)

@@ -82,10 +82,7 @@ def errors(flight: AnalysedLog) -> TimeSeries:
 def base_angles(attitude: Array, vectors: Array, flight: AnalysedLog) -> Array:
     """Return the angles (N, 3) of the base's pointing, arcsec, by `ANGLES`.
 
-    Args:
-        attitude: (N, 4) `attitude_error`.
-        vectors: (N, 3) rad, the same as rotation vectors.
-        flight: with the axis that points.
+    ``attitude``: (N, 4) `attitude_error`; ``vectors``: (N, 3) rad, the same as rotation vectors.
     """
     axis, eps = np.array(flight.budget.axis), attitude[:, 1:]
     about = dot_rows(eps, axis[np.newaxis])
@@ -143,14 +140,10 @@ def lacking_for_jitter(name: str, seconds: float, window_s: float, period: float
     return f"needs {window_s:g} s of flight (pointing.window_s), got {seconds:g} s"
 
 
-@series(
-    "attitude drift",
-    {
-        "attitude_drift": Definition(
-            "rad", "rotation of a base without actuators since the first tick", ALL
-        )
-    },
-)
+DRIFT = "rotation of a base without actuators since the first tick"
+
+
+@series("attitude drift", {"attitude_drift": Definition("rad", DRIFT, ALL)})
 def drift(flight: AnalysedLog) -> TimeSeries | None:
     """Return the angle by which a free base has turned since the first tick."""
     if flight.controls_base:
@@ -259,9 +252,9 @@ def rotation_angle(first: Array, second: Array) -> Array:
 
     ``sin = |vee(R - R^T)| / 2``, ``cos = (trace(R) - 1) / 2``.
     """
-    axes = [(first[:, :, k], second[:, :, k]) for k in range(3)]
     # vee(a b^T - b a^T) = b x a for each pair of columns; trace(R) is the sum of their products
-    sine = 0.5 * np.linalg.norm(sum(np.cross(b, a) for a, b in axes), axis=1)
-    cosine = 0.5 * (sum(np.sum(a * b, axis=1) for a, b in axes) - 1.0)
+    crossed = np.cross(second, first, axisa=1, axisb=1).sum(axis=1)
+    sine = 0.5 * np.linalg.norm(crossed, axis=1)
+    cosine = 0.5 * (np.sum(first * second, axis=(1, 2)) - 1.0)
     angle: Array = np.arctan2(sine, cosine)
     return angle

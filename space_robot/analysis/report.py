@@ -1,19 +1,27 @@
-"""What a flight was, and all its metrics, in one dictionary, ready for JSON."""
+"""What a flight was and all its metrics: a dictionary ready for JSON, and a page of several."""
 
 from __future__ import annotations
 
-from typing import Any
+import json
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
 
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.bag.law_history import as_data, laws_of
 from space_robot_msgs_py.config.validation import short
 from space_robot_msgs_py.errors import InputError
 
-from .analysed_log import AnalysedLog, PointingBudget, pointed_axis, pointing_of
+from ..console.tables import Column, JudgedCell, Table
+from .analysed_log import AnalysedLog, PointingBudget
 from .described import actuators_of, event_labels, navigation_of, sensors_of, start_step_of
 from .errors import UNAVAILABLE
 from .measure import evaluate
+from .report_tables import comparison_table, sizing_table
 from .sizing import ActuatorSet, load_requirements
+from .words import Report, law_of, notes, remarks
+
+if TYPE_CHECKING:
+    import jinja2
 
 DESCRIBED = ("controller", "case", "gains", "robot")
 """Keys of a flight's description that a report repeats."""
@@ -39,11 +47,14 @@ def analyze(
         raise InputError(f"log: a FlightLog was expected (load_bag reads one), got {short(log)}")
     flight = AnalysedLog(_without_gaps(log), budget, actuators.settings if actuators else None)
     numbers, unavailable = evaluate(flight)
-    if not flight.controls_base:
+    pointing = None
+    if flight.controls_base:
+        pointing = {"points": flight.pointed_axis is not None, **flight.budget.model_dump()}
+    else:
         unavailable = UNAVAILABLE | unavailable
     return {
         **_flown(flight, log.ticks),
-        "pointing": _pointing(flight),
+        "pointing": pointing,
         "metrics": numbers,
         "sizing": None if "sizing" in unavailable else _sizing(flight, actuators, numbers),
         "unavailable": unavailable,
@@ -52,7 +63,6 @@ def analyze(
 
 
 def _flown(flight: AnalysedLog, flight_ticks: int) -> dict[str, Any]:
-    """Describe what was flown, and the part of it that is analyzed."""
     log, period_ns = flight.log, flight.log.timebase.period_ns
     laws, stop = laws_of(log), log.first_tick + log.ticks
     return {
@@ -76,18 +86,9 @@ def _flown(flight: AnalysedLog, flight_ticks: int) -> dict[str, Any]:
     }
 
 
-def _pointing(flight: AnalysedLog) -> dict[str, Any] | None:
-    """Describe what the base's pointing is measured against; None: nothing turns the base."""
-    if not flight.controls_base:
-        return None
-    points = pointed_axis(*pointing_of(flight.log)) is not None
-    return {"points": points, **flight.budget.model_dump()}
-
-
 def _sizing(
     flight: AnalysedLog, other: ActuatorSet | None, numbers: dict[str, float]
 ) -> dict[str, Any]:
-    """Judge whether the parts of actuators have what is asked of them; without parts: nothing."""
     name, settings = other or ActuatorSet(actuators_of(flight.log), flight.actuators)
     judged = [requirement.as_data() for requirement in load_requirements(settings, numbers)]
     return {"actuators": name, "flown": other is None, "requirements": judged}
@@ -113,3 +114,74 @@ def _without_gaps(log: FlightLog) -> FlightLog:
         said = f"analyzed from t = {start:.4f} to {stop:.4f} s, the longest stretch without a gap"
         without_gaps.damage += (said,)
     return without_gaps
+
+
+def render(
+    reports: Mapping[str, Report],
+    descriptions: Mapping[str, dict[str, Any]],
+    figures: Sequence[tuple[str, str]],
+) -> str:
+    """Render a page of one flight or several, without references to anything outside itself.
+
+    Args:
+        reports: of `analyze`, by name of the bag.
+        descriptions: what was flown, as the bags have it.
+        figures: caption and data URI of each.
+    """
+    return template("space_robot.analysis", "flights.html.j2").render(
+        names=list(reports),
+        recorded=_recorded(reports),
+        metrics=comparison_table(reports),
+        sizing={name: table for name, r in reports.items() if (table := sizing_table(r))},
+        notes={name: [*remarks(r), *notes(r)] for name, r in reports.items()},
+        descriptions={name: json.dumps(d, indent=1) for name, d in descriptions.items()},
+        figures=figures,
+    )
+
+
+def _recorded(reports: Mapping[str, Report]) -> Table:
+    names = ("bag", "law", "case", "gains", "robot", "time analysed", "ticks", "recording")
+    rows = [
+        [
+            name,
+            law_of(report) or "not said",
+            *(report[key] or "not said" for key in ("case", "gains", "robot")),
+            f"{report['from_s']:g} to {report['to_s']:g} s",
+            report["ticks"]
+            if report["ticks"] == report["flight_ticks"]
+            else f"{report['ticks']} of {report['flight_ticks']}",
+            JudgedCell("", *(("whole", "good") if _is_whole(report) else ("not whole", "bad"))),
+        ]
+        for name, report in reports.items()
+    ]
+    return Table.of("", [Column(name) for name in names], rows)
+
+
+def _is_whole(report: Report) -> bool:
+    missing = any(report["lost"].values()) or report["filled_ticks"]
+    return not (missing or report["unfinished"] or report["damage"])
+
+
+def template(package: str, name: str) -> jinja2.Template:
+    """Load the template ``name`` from the folder ``templates`` of ``package``; it escapes.
+
+    It may import ``table.html.j2``, which draws a `tables.Table`. Data for a script are written
+    with the filter ``tojson``, which escapes what would end or hide the script.
+    """
+    import jinja2  # slow to import
+
+    environment = jinja2.Environment(
+        loader=jinja2.ChoiceLoader(
+            [
+                jinja2.PackageLoader(package, "templates"),
+                jinja2.PackageLoader("space_robot.analysis", "templates"),
+            ]
+        ),
+        autoescape=True,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        undefined=jinja2.StrictUndefined,
+    )
+    environment.filters["zip"] = zip
+    environment.policies["json.dumps_kwargs"] = {"separators": (",", ":"), "allow_nan": False}
+    return environment.get_template(name)

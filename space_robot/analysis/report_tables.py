@@ -14,7 +14,7 @@ from ..console.tables import NONE, Column, Group, JudgedCell, Row, Table
 from .described import IDEAL
 from .measure import column_unit, describe, group_of
 from .series import GROUPS
-from .words import Report, analyzed, flown, law_of, notes, remarks, seen_through
+from .words import Report, analyzed, flown, law_of, notes, of_statistic, remarks, seen_through
 
 IN_RMS_TABLE = ("rms", "rms_eq64", "variation", "chatter", "ripple")
 """Statistics of the table of RMS."""
@@ -33,9 +33,8 @@ def rms_table(report: Report) -> Table:
     if report["truth_recorded"]:
         title += f"\n{seen_through(report)}"
     names = table_v_columns(metrics)
-    by_eq64 = {name: metrics[f"{name}.rms_eq64"] for name in names}
-    seen = {name: metrics.get(f"navigation_{name}.rms", "") for name in names}
-    is_seen = any(value != "" for value in seen.values())
+    is_seen = any(f"navigation_{name}.rms" in metrics for name in names)
+    second = "navigation_{}.rms" if is_seen else "{}.rms_eq64"
     columns = (
         Column(is_label=True),
         Column("unit"),
@@ -50,11 +49,8 @@ def rms_table(report: Report) -> Table:
     rows: list[list[Any]] = []
     for name in names:
         spec = ".3e" if is_wide or name not in torques else ".4f"
-        second = seen[name] if is_seen else by_eq64[name]
-        rms = [
-            value if value == "" else format(value, spec)
-            for value in (metrics[f"{name}.rms"], second)
-        ]
+        both = (metrics.get(key.format(name)) for key in ("{}.rms", second))
+        rms = ["" if value is None else format(value, spec) for value in both]
         rough = (metrics.get(f"{name}.{key}", "") for key in ("variation", "chatter", "ripple"))
         rows.append([short_name(name), column_unit(name), *rms, *rough])
     return Table(title, columns, [Group(rows)], remarks(report))
@@ -62,8 +58,7 @@ def rms_table(report: Report) -> Table:
 
 def table_v_columns(metrics: Mapping[str, float]) -> list[str]:
     """Return the columns of errors and torques of Table V; of the attitude that of its angles."""
-    columns = [name.removesuffix(".rms_eq64") for name in metrics if name.endswith(".rms_eq64")]
-    return [name for name in columns if describe(f"{name}.rms").is_shown]
+    return [c for c in of_statistic(metrics, "rms_eq64") if describe(f"{c}.rms").is_shown]
 
 
 def short_name(column: str) -> str:
@@ -170,9 +165,8 @@ def _recording(reports: Sequence[Report]) -> list[Group]:
 
 
 def _errors_of(report: Report) -> str:
-    if report["truth_recorded"]:
-        return "the truth"
-    return "the truth" if report["sensors"] == IDEAL else "what was measured"
+    is_truth = report["truth_recorded"] or report["sensors"] == IDEAL
+    return "the truth" if is_truth else "what was measured"
 
 
 BY_AXIS = (

@@ -58,7 +58,7 @@ class TimeSeries(NamedTuple):
     are not known are NaN."""
     unknown: str = "no tick is known"
     """Why there are no statistics, where no row is known."""
-    derive: Callable[[dict[str, float]], dict[str, float]] | None = None
+    derive: Callable[[dict[str, float]], dict[str, float]] = lambda numbers: {}
     """Makes further metrics of the statistics."""
 
 
@@ -80,11 +80,7 @@ class MetricGroup:
     """By pattern of a metric's name, or of a series' column; `expand` fills ``{places}`` in."""
 
     def evaluate(self, flight: AnalysedLog, window: range) -> dict[str, float]:
-        """Return the metrics of the rows in a window.
-
-        Raises:
-            InputError: the flight does not have them.
-        """
+        """Return the metrics of the rows in a window; without them InputError says why."""
         raise NotImplementedError
 
     def names(self, flight: AnalysedLog) -> list[str]:
@@ -104,17 +100,13 @@ class SeriesGroup(MetricGroup):
     derived: Mapping[str, Definition]
 
     def evaluate(self, flight: AnalysedLog, window: range) -> dict[str, float]:
-        """Return the statistics over the known rows in a window.
-
-        Raises:
-            InputError: there are none.
-        """
+        """Return the statistics over the known rows in a window."""
         series = self.source(flight)
         if series is None:
             return {}
         count, squares = 0, np.zeros(1)
         largest, last = dict.fromkeys(series.axes, 0.0), np.zeros((1, 0))
-        for start, values in self.blocks(flight, series):
+        for start, values in self._blocks(flight, series):
             rows = values[max(window.start - start, 0) : max(window.stop - start, 0)]
             sums = np.einsum("ij,ij->j", rows, rows)
             if np.isnan(sums).any():
@@ -138,16 +130,14 @@ class SeriesGroup(MetricGroup):
             }
             for name in self.quantity(column).statistics:
                 numbers[f"{column}.{name}"] = statistics[name]
-        return numbers | (series.derive(numbers) if series.derive else {})
+        return numbers | series.derive(numbers)
 
     def names(self, flight: AnalysedLog) -> list[str]:
         """Return a name for each statistic of each column."""
-        series = self.source(flight)
-        columns = series.axes if series else ()
-        return [
-            *(f"{column}.{s}" for column in columns for s in self.quantity(column).statistics),
-            *(self.derived if columns else ()),
-        ]
+        if (series := self.source(flight)) is None:
+            return []
+        names = [f"{c}.{s}" for c in series.axes for s in self.quantity(c).statistics]
+        return [*names, *self.derived]
 
     def describe(self) -> Iterator[tuple[str, Definition]]:
         """Yield each statistic of each column."""
@@ -157,28 +147,26 @@ class SeriesGroup(MetricGroup):
                 yield f"{column}.{statistic}", quantity._replace(text=text)
         yield from self.derived.items()
 
+    def sizes(self, flight: AnalysedLog) -> Iterator[tuple[int, dict[str, Array]]]:
+        """Yield the first row and the size of each column at each tick, block by block."""
+        if series := self.source(flight):
+            for start, values in self._blocks(flight, series):
+                yield start, {c: self._size(c, values[:, axes]) for c, axes in series.axes.items()}
+
+    def _blocks(self, flight: AnalysedLog, series: TimeSeries) -> Iterator[tuple[int, Array]]:
+        for start, stop in flight.blocks():
+            if (start, stop) != (0, flight.log.ticks):
+                yield start, series.values(start, stop)
+                continue
+            if self.name not in flight.values:
+                flight.values[self.name] = series.values(start, stop)
+            yield start, flight.values[self.name]
+
     def quantity(self, column: str) -> Definition:
         """Return unit and meaning of a column."""
         return next(q for name, q in self.quantities.items() if fnmatchcase(column, pattern(name)))
 
-    def blocks(self, flight: AnalysedLog, series: TimeSeries) -> Iterator[tuple[int, Array]]:
-        """Yield the first row and the values of each block; of a short flight computed once."""
-        if len(blocks := list(flight.blocks())) > 1:
-            for start, stop in blocks:
-                yield start, series.values(start, stop)
-            return
-        if self.name not in flight.values:
-            flight.values[self.name] = series.values(0, flight.log.ticks)
-        yield 0, flight.values[self.name]
-
-    def sizes(self, flight: AnalysedLog) -> Iterator[tuple[int, dict[str, Array]]]:
-        """Yield the first row and the size of each column at each tick, block by block."""
-        if series := self.source(flight):
-            for start, values in self.blocks(flight, series):
-                yield start, {c: self._size(c, values[:, axes]) for c, axes in series.axes.items()}
-
     def _size(self, column: str, values: Array) -> Array:
-        """(N,) size of a column (N, axes) at each row."""
         return norms(values) if self.quantity(column).is_vector else largest_sizes(values)
 
 
@@ -211,12 +199,15 @@ def largest_sizes(values: Array) -> Array:
 GROUPS: dict[str, MetricGroup] = {}
 """By name, in the order of reports; `space_robot.analysis.measure` imports all."""
 
+SeriesSource = Callable[[AnalysedLog], TimeSeries | None]
+MetricsFunction = Callable[[AnalysedLog], dict[str, float]]
+
 
 def series(
     title: str,
     quantities: Mapping[str, Definition],
     derived: Mapping[str, Definition] | None = None,
-) -> Callable[[Callable[[AnalysedLog], TimeSeries | None]], SeriesGroup]:
+) -> Callable[[SeriesSource], SeriesGroup]:
     """Register a function from a flight to its `TimeSeries`; None: it is not of this flight.
 
     Args:
@@ -225,7 +216,7 @@ def series(
         derived: what `TimeSeries.derive` returns, by the metrics' names.
     """
 
-    def register(source: Callable[[AnalysedLog], TimeSeries | None]) -> SeriesGroup:
+    def register(source: SeriesSource) -> SeriesGroup:
         group = SeriesGroup(source.__name__, title, quantities, source, derived or {})
         GROUPS[group.name] = group
         return group
@@ -237,17 +228,20 @@ def metrics(
     title: str,
     quantities: Mapping[str, Definition],
     applies: Callable[[AnalysedLog], bool] = lambda flight: True,
-) -> Callable[[Callable[[AnalysedLog], dict[str, float]]], FunctionGroup]:
+    is_shown: bool = True,
+) -> Callable[[MetricsFunction], FunctionGroup]:
     """Register a function from a flight to some of its metrics.
 
     Args:
         title: of the metrics in reports.
         quantities: by the metrics' names, in which ``{joint}`` stands for each joint, see `expand`.
         applies: whether a flight has them; where it should and cannot, the function raises.
+        is_shown: whether tables of reports have any of them.
     """
+    shown = {name: q._replace(is_shown=q.is_shown and is_shown) for name, q in quantities.items()}
 
-    def register(function: Callable[[AnalysedLog], dict[str, float]]) -> FunctionGroup:
-        group = FunctionGroup(function.__name__, title, quantities, function, applies)
+    def register(function: MetricsFunction) -> FunctionGroup:
+        group = FunctionGroup(function.__name__, title, shown, function, applies)
         GROUPS[group.name] = group
         return group
 

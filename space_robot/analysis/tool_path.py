@@ -11,6 +11,7 @@ it, so the path moves with it; by how much is a number of its own.
 
 from __future__ import annotations
 
+from contextlib import suppress
 from itertools import pairwise
 
 import numpy as np
@@ -25,7 +26,7 @@ from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.config.validation import validate
 from space_robot_msgs_py.errors import InputError
 
-from .analysed_log import AnalysedLog
+from .analysed_log import AnalysedLog, recorded_mission
 from .described import assumed_robot_of, captures_of
 from .momentum import happens_in
 from .pointing import rotation_angle
@@ -44,14 +45,11 @@ class ToolPath:
     """The path that a mission leads the first tool along; rows are asked for in their order."""
 
     def __init__(self, log: FlightLog) -> None:
-        """Take the place where the path begins.
+        """Take the place where the path begins; InputError: a robot is not known.
 
         The flight software knows where the base is, and places it by the frame of the assumed
         robot, which is not the true one's if the true base's centre of mass is elsewhere. That
         frame is at the path's origin at the first row.
-
-        Raises:
-            InputError: the robot that flew or the assumed one is not known.
         """
         self._log, self._captures = log, captures_of(log)
         self._robot = assumed_robot_of(log).nominal
@@ -139,9 +137,8 @@ def leads_tool(log: FlightLog) -> bool:
     """
     if log.scenario is not None:
         return bool(log.scenario.reference.leads_tool)
-    scenario = log.flight.get("scenario")
-    planned = scenario.get("mission") if isinstance(scenario, dict) else None
-    if not isinstance(planned, dict) or not log.ticks:
+    planned = recorded_mission(log)
+    if not planned or not log.ticks:
         return False
     try:
         own = {key: planned[key] for key in MissionSettings.model_fields if key in planned}
@@ -159,14 +156,8 @@ def leads_tool(log: FlightLog) -> bool:
 
 
 def wanted_poses(log: FlightLog) -> Poses | None:
-    """Return the poses that the tool was led through.
-
-    None: see `leads_tool`, or the bag does not tell the robot.
-    """
-    if not leads_tool(log):
-        return None
-    try:
-        orientation, position, _ = ToolPath(log).wanted(0, log.ticks)
-        return orientation, position
-    except InputError:
-        return None
+    """Return the poses that the tool was led through; None: none, or the robot is not known."""
+    if leads_tool(log):
+        with suppress(InputError):
+            return ToolPath(log).wanted(0, log.ticks)[:2]
+    return None

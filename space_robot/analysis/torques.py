@@ -76,10 +76,12 @@ def roughness(flight: AnalysedLog) -> dict[str, float]:
     """Compute total variation, and the share of power above `CHATTER_FREQUENCY`."""
     torque, period = flight.log.applied_torque, flight.log.timebase.period
     ticks, axes = torque.shape
-    variation, power = np.zeros(axes), np.zeros((2, axes))
-    for start, stop in flight.blocks():
-        steps = np.diff(torque[max(start - 1, 0) : stop], axis=0)
-        variation += np.sum(np.abs(steps, out=steps), axis=0)
+
+    def vary(start: int, stop: int) -> Array:
+        steps = np.abs(np.diff(torque[max(start - 1, 0) : stop], axis=0))
+        return np.asarray(np.sum(steps, axis=0))
+
+    variation, power = flight.sum_up(vary), np.zeros((2, axes))
     # segments half over one another, as many as leave no part of the flight out
     step = ticks // max(2, math.ceil(2 * ticks / BLOCK_TICKS))
     length = 2 * step if ticks > BLOCK_TICKS else ticks
@@ -190,12 +192,9 @@ def ripple(flight: AnalysedLog) -> dict[str, float]:
 
 
 def lacking_for_ripple(name: str, seconds: float, period: float) -> str:
-    """Return why there is no ripple of some seconds of a flight; empty: there is.
+    """Return why a metric is not a ripple of some seconds of a flight; empty: there may be one.
 
-    Args:
-        name: of a metric.
-        seconds: of the flight, or of a window in it.
-        period: of the ticks, s.
+    ``period``: of the ticks, s.
     """
     if ".ripple" not in name:
         return ""
@@ -212,9 +211,6 @@ def ripple_spectrum(flight: AnalysedLog) -> RippleSpectrum:
 
     Segments begin a quarter of their length apart, for then the squares of Hann's windows add up to
     a constant: but for both ends of the flight every moment counts alike.
-
-    Raises:
-        InputError: the flight is too short, its ticks too far apart, or its robot not known.
     """
     log, period, robot = flight.log, flight.log.timebase.period, flight.robot
     if 0.5 / period <= SLOWEST:
@@ -260,8 +256,7 @@ def segment_spectra(
 ) -> Iterator[Array]:
     """Yield the one-sided power spectrum (F, axes) of each whole segment of a signal.
 
-    The power at a frequency is the squared size of the transform, that of the negative frequency
-    added.
+    The power is the squared size of the transform, that of the negative frequency added.
 
     Args:
         values: returns the rows (stop - start, axes) from ``start`` to before ``stop``.

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 from space_robot_control.controller.law_choice import NoLaw
 from space_robot_msgs_py.bag.law_history import in_words
 
 from ..flight.start_step import sentence
-from .actuation import LONG_STANDING
+from .actuation import LIMIT_KINDS, LONG_STANDING
 from .errors import FREE
 from .measure import column_unit
 
@@ -26,18 +26,11 @@ LASTING_CYCLE = 0.5
 
 
 def flown(described: Mapping[str, Any]) -> str:
-    """Say what was flown, in a few words.
-
-    Args:
-        described: a report, or the description in a bag.
-    """
+    """Say in a few words what was flown, by a report or the description in a bag."""
     law = law_of(described)
     has_gains = law != NoLaw.name
-    known = [
-        f"{key} {described[key]}"
-        for key in ("case", *(("gains",) if has_gains else ()))
-        if described.get(key)
-    ]
+    keys = ("case", "gains") if has_gains else ("case",)
+    known = [f"{key} {described[key]}" for key in keys if described.get(key)]
     if own := described.get("own_gains"):
         known.append(f"own {', '.join(own)}")
     return ", ".join([str(law or "unknown law") if has_gains else "torques from outside", *known])
@@ -67,68 +60,73 @@ def law_of(described: Mapping[str, Any]) -> str | None:
 
 def remarks(report: Report) -> list[str]:
     """Say in sentences what was lost, damaged or left unanswered."""
-    lost = {topic: count for topic, count in report["lost"].items() if count}
-    remarks = [f"messages lost: {lost or 'none'}"]
-    if step := report.get("start_step"):
-        remarks.append(sentence(step))
-    if report["events"]:
-        remarks.append(f"events: {', '.join(report['events'])}")
-    if disturbance := report.get("disturbance"):
-        remarks.append(f"disturbance of the user's own, unknown to the law: {disturbance}")
     metrics = report["metrics"]
-    remarks += [
-        f"{name.removeprefix('missed.')} did not happen: the target was {distance:.3g} m from "
-        "where the tool holds it"
-        for name, distance in metrics.items()
-        if name.startswith("missed.")
+    lost = {topic: count for topic, count in report["lost"].items() if count}
+    return [
+        f"messages lost: {lost or 'none'}",
+        *_beginning(report),
+        *_missed_captures(metrics),
+        *_drift(metrics),
+        *_pointing(report["pointing"], metrics),
+        *_saturated_wheels(metrics),
+        *_limit_cycles(metrics),
+        *_standing_joints(metrics),
+        *_beyond_limits(metrics),
+        *filter(None, (report["unfinished"], *report["damage"])),
+        *_missing_ticks(report),
     ]
+
+
+def _beginning(report: Report) -> Iterator[str]:
+    if step := report.get("start_step"):
+        yield sentence(step)
+    if report["events"]:
+        yield f"events: {', '.join(report['events'])}"
+    if disturbance := report.get("disturbance"):
+        yield f"disturbance of the user's own, unknown to the law: {disturbance}"
+
+
+def _missed_captures(metrics: Metrics) -> Iterator[str]:
+    for name, distance in metrics.items():
+        if name.startswith("missed."):
+            yield (
+                f"{name.removeprefix('missed.')} did not happen: the target was {distance:.3g} m "
+                "from where the tool holds it"
+            )
+
+
+def _drift(metrics: Metrics) -> Iterator[str]:
     if "attitude_drift.max" in metrics:
         most, end = (math.degrees(metrics[f"attitude_drift.{key}"]) for key in ("max", "end"))
-        remarks.append(
+        yield (
             f"{FREE}: its attitude is no error but drift, {most:.4g} deg at most and "
             f"{end:.4g} deg at the end, which pointing includes"
         )
-    remarks += _pointing(report["pointing"], metrics)
-    remarks += _saturated_wheels(metrics)
-    remarks += [*_limit_cycles(metrics), *_standing_joints(metrics), *_beyond_limits(metrics)]
-    remarks += [text for text in (report["unfinished"], *report["damage"]) if text]
-    if report["unanswered_ticks"]:
-        remarks.append(f"ticks that no command was recorded for: {report['unanswered_ticks']}")
-    if report["filled_ticks"]:
-        remarks.append(
-            f"ticks without a usable state, shown as the one before: {report['filled_ticks']}"
-        )
-    return remarks
 
 
-def _pointing(base: dict[str, Any] | None, metrics: Metrics) -> list[str]:
-    """Say how well a base points whose mission points it."""
+def _pointing(base: dict[str, Any] | None, metrics: Metrics) -> Iterator[str]:
     if not base or not base["points"]:
-        return []
+        return
     jitter = metrics.get("half_cone.jitter_rms")
     within = "" if jitter is None else f", jitter {jitter:.3g} within {base['window_s']:g} s"
-    return [
+    yield (
         f"the base points: half cone from the reference {metrics['half_cone.rms']:.3g} arcsec RMS, "
         f"{metrics['half_cone.max']:.3g} at most{within}; about the axis "
         f"{metrics['about_axis.rms']:.3g} RMS, {metrics['about_axis.max']:.3g} at most"
-    ]
+    )
 
 
-def _saturated_wheels(metrics: Metrics) -> list[str]:
-    """Say which wheel reached a limit first, and for how long any was at one."""
-    first = of_statistic(metrics, "first_limit")
-    if not first:
-        return []
-    name = min(first, key=lambda wheel: first[wheel])
-    return [
-        "wheels were at a limit of torque or momentum at "
-        f"{metrics['wheels.saturation_ticks']:.0f} ticks "
-        f"({metrics['wheels.saturation']:.2%}), {name} first at {first[name]:g} s"
-    ]
+def _saturated_wheels(metrics: Metrics) -> Iterator[str]:
+    if first := of_statistic(metrics, "first_limit"):
+        name = min(first, key=lambda wheel: first[wheel])
+        yield (
+            "wheels were at a limit of torque or momentum at "
+            f"{metrics['wheels.saturation_ticks']:.0f} ticks "
+            f"({metrics['wheels.saturation']:.2%}), {name} first at {first[name]:g} s"
+        )
 
 
-def _limit_cycles(metrics: Metrics) -> list[str]:
-    """Say which torques oscillate at one frequency, by more than a share of what they do."""
+def _limit_cycles(metrics: Metrics) -> Iterator[str]:
     cycles = [
         f"{name} at {metrics[f'{name}.ripple_peak_hz']:.3g} Hz with {peak:.2g} "
         f"{column_unit(name)} RMS"
@@ -138,28 +136,32 @@ def _limit_cycles(metrics: Metrics) -> list[str]:
         and peak >= PURE_CYCLE * metrics[f"{name}.ripple"]
         and peak >= LARGE_CYCLE * metrics[f"{name}.rms"]
     ]
-    return [f"limit cycle: {', '.join(cycles)}"] if cycles else []
+    if cycles:
+        yield f"limit cycle: {', '.join(cycles)}"
 
 
-def _standing_joints(metrics: Metrics) -> list[str]:
-    """Say which joints stood on a part of the way that they were to move."""
+def _standing_joints(metrics: Metrics) -> Iterator[str]:
     standing = of_statistic(metrics, "standing")
     much = [f"{name} {share:.0%}" for name, share in standing.items() if share >= LONG_STANDING]
-    if not much:
-        return []
-    return [f"joints that stood still on a part of the way they were to move: {', '.join(much)}"]
+    if much:
+        yield f"joints that stood still on a part of the way they were to move: {', '.join(much)}"
 
 
-def _beyond_limits(metrics: Metrics) -> list[str]:
-    """Say which joints were beyond which limits of their file, and at how many ticks."""
-    beyond: dict[str, list[str]] = {}
-    kinds = ("position", "velocity", "effort")
+def _beyond_limits(metrics: Metrics) -> Iterator[str]:
+    joints = []
     for name in of_statistic(metrics, "beyond_position"):
-        for kind in kinds:
-            if ticks := metrics[f"{name}.beyond_{kind}"]:
-                beyond.setdefault(name, []).append(f"{kind} at {ticks:.0f} ticks")
-    joints = [f"{name} ({', '.join(texts)})" for name, texts in beyond.items()]
-    return [f"joints beyond the limits of the robot's file: {', '.join(joints)}"] if joints else []
+        ticks = {kind: metrics[f"{name}.beyond_{kind}"] for kind in LIMIT_KINDS}
+        if texts := [f"{kind} at {count:.0f} ticks" for kind, count in ticks.items() if count]:
+            joints.append(f"{name} ({', '.join(texts)})")
+    if joints:
+        yield f"joints beyond the limits of the robot's file: {', '.join(joints)}"
+
+
+def _missing_ticks(report: Report) -> Iterator[str]:
+    if report["unanswered_ticks"]:
+        yield f"ticks that no command was recorded for: {report['unanswered_ticks']}"
+    if report["filled_ticks"]:
+        yield f"ticks without a usable state, shown as the one before: {report['filled_ticks']}"
 
 
 def of_statistic(metrics: Metrics, statistic: str) -> dict[str, float]:

@@ -159,7 +159,7 @@ def analyze(
                 files = ", ".join(str(figure.svg.with_suffix(".png")) for figure in figures)
                 click.echo(f"wrote {files} and .svg", err=True)
             if html:
-                from ..analysis.page import render
+                from ..analysis.report import render
 
                 shown = [(figure.caption, figure.data_uri) for figure in figures]
                 write_text(render(reports, descriptions, shown), html)

@@ -101,7 +101,7 @@ def plan(
     if out is not None:
         write_text(mission_text(settings), out)
     if figure is not None:
-        from ..analysis.figures.mission_plan import draw_plan
+        from ..analysis.figures.single_flight import draw_plan
 
         draw_plan(robot, segments, figure)
     if as_json:

@@ -10,8 +10,8 @@ from space_robot_control.navigation.settings import NavigationMode
 from space_robot_msgs_py.errors import DivergedError, InputError
 
 from ..analysis.figures import control_results
+from ..analysis.figures.base_torque import BaseTorque
 from ..analysis.figures.figure_set import FigureFolder
-from ..analysis.figures.flight_curves import BaseTorque
 from ..analysis.measure import measure
 from ..flight.plan import Flight, Scenario, resolve
 from ..flight.simulate import simulate

@@ -13,8 +13,8 @@ from scipy.spatial.transform import Rotation
 from space_robot_model.robot import Robot
 from space_robot_msgs_py.bag.flight_log import FlightLog
 
+from ..analysis.errors import waypoint_ticks
 from ..analysis.tool_path import Poses, wanted_poses
-from ..analysis.waypoints import waypoint_ticks
 from .actuators import add_actuators
 from .frames import Frames, Move
 from .orbit import OrbitArrows, OrbitFrames, add_earth

@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ..analysis.report import template
 from space_robot_model.robot import Robot
 from space_robot_model.robot.find import find_robot, robot_as_path
 from space_robot_model.robot.parts import Spring

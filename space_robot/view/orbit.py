@@ -18,7 +18,7 @@ from space_robot_model.robot import Robot
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.errors import InputError
 
-from ..analysis.described import orbit_of
+from ..analysis.described import plant_settings
 from .frames import Frames, Move, held_rows, rounded
 from .meshes import grid_faces, revolved_glb, unlit_glb
 from .scene import palette, rgb, set_pose, turns_from_z
@@ -118,7 +118,7 @@ def is_in_orbit(log: FlightLog) -> bool:
 def sun_direction(log: FlightLog) -> Array | None:
     """Return the unit vector (3,) to the Sun; None: no sunlight acts, or the bag does not say."""
     try:
-        settings = orbit_of(log)
+        settings = plant_settings(log)
     except InputError:
         return None
     return settings.sun if settings.has_orbit and settings.sunlight.pressure > 0.0 else None

@@ -23,7 +23,7 @@ from space_robot_sim.environment.events import Capture, Event, Release
 from space_robot_sim.environment.impact import Grasp
 from space_robot_sim.environment.neighbouring_orbit import free_fall
 
-from ..analysis.described import captures_of, events_of, orbit_of
+from ..analysis.described import captures_of, events_of, plant_settings
 from ..analysis.momentum import happens_in
 from .frames import Move
 from .scene import RobotScene, add_shape, set_pose
@@ -106,12 +106,13 @@ def _drifts(
     moment = tick_from(event.time_s, period) * period
     body = before_capture(met, log, robot) if met else None
     if met is None:  # it flies past
-        positions, axes = free_fall(event.target, orbit_of(log), times)
+        positions, axes = free_fall(event.target, plant_settings(log), times)
         own = Rotation.from_matrix(grasp.tool_axes @ event.target.rotation)
         turns = Rotation.from_quat(axes, scalar_first=True) * own.inv()
         yield "free", Drift(0, positions, turns.as_quat(scalar_first=True))
     elif body is not None and start > 0 and event.target.is_in_orbit:
-        positions, axes = free_fall(event.target, orbit_of(log), np.append(times[:start], moment))
+        orbit = plant_settings(log)
+        positions, axes = free_fall(event.target, orbit, np.append(times[:start], moment))
         turns = Rotation.from_quat(axes, scalar_first=True)
         # the box is drawn in the axes of the body that will hold it
         fixed = turns[-1].inv() * Rotation.from_matrix(body.rotation)

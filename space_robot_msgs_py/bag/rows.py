@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import math
+import tempfile
 from collections import Counter
+from collections.abc import Iterator
 from types import SimpleNamespace
-from typing import Any
+from typing import IO, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,6 +35,8 @@ from .message_accounting import LONGEST_JUMP, MessageAccounting
 _GROWTH = 1.25
 _TICKS_A_MESSAGE = 20
 """A tick further away than so many ticks a message is not believed: it would cost memory."""
+FILES_FROM = 2**29
+"""Bytes from which on the columns lie in files, which have no names and go with them."""
 LAST_TICK = 2**53
 """A tick in a float64 is exact below."""
 _NEVER = np.iinfo(np.int64).min
@@ -70,7 +74,8 @@ class Rows:
         self._apart = SimpleNamespace(**{name: np.empty((0, 0)) for name in MEASURED_APART})
         """What sensors with a topic of their own measured; the true columns are in the log."""
         self._errors: list[tuple[Integers, Array]] = []
-        """Ticks and e of the telemetry."""
+        """Ticks and e of telemetry that is not yet in its rows."""
+        self._files: dict[tuple[int, str], IO[bytes]] = {}  # by the column's table and name
         self._laws: list[LawInForce] = []
         self._law_faults: list[str] = []
 
@@ -104,6 +109,12 @@ class Rows:
             self._note_laws(batch, ticks)
             return
         self._grow(counted.last + 1)
+        for at, error in self._errors:
+            if self.log.assumed_error is None:
+                self.log.assumed_error = np.full((self._rows, self.log.axes), np.nan)
+            inside = (at >= 0) & (at < self._rows)
+            self.log.assumed_error[at[inside]] = error[inside]
+        self._errors.clear()
         if topic in self._unnamed:
             self._learn_names(topic, batch)
         reader = self._readers.get(topic)
@@ -171,15 +182,17 @@ class Rows:
         """Return the log, cut to ``ticks`` rows."""
         log = self.log
         log.laws = in_order(law for law in self._laws if law.tick < ticks)
-        for column in self._columns():
-            column.resize((ticks, *column.shape[1:]), refcheck=False)
+        for table, name, column in self._columns():
+            if isinstance(column, np.memmap):
+                table[name] = column[:ticks]
+            else:
+                column.resize((ticks, *column.shape[1:]), refcheck=False)
         if topics.COMMAND.full_name not in self.accounting:
             log.commanded_torque = None
-        if log.measured is not None:
+        if log.measured is None:
+            log.assumed_error = None
+        elif log.assumed_error is None:
             log.assumed_error = np.full((ticks, log.axes), np.nan)
-            for at, error in self._errors:
-                inside = (at >= 0) & (at < ticks)
-                log.assumed_error[at[inside]] = error[inside]
         sent, answered = self._sent_ns[topics.BASE_STATE], self._sent_ns[topics.COMMAND]
         if self._is_wall_clock and topics.COMMAND.full_name in self.accounting:
             both = (answered != _NEVER) & (sent != _NEVER)
@@ -201,7 +214,6 @@ class Rows:
         return ticks, known
 
     def _put(self, topic: topics.Topic, ticks: Integers, values: Array) -> None:
-        """Put messages' rows, of which the first belongs to the tick, where the columns say."""
         description = self._readers[topic].description
         rows: Array = values.reshape(len(ticks), -1, description.width)
         length = rows.shape[1]
@@ -233,10 +245,12 @@ class Rows:
             except MessageError as error:
                 self._law_faults.append(str(error))
 
-    def _columns(self) -> list[NDArray[Any]]:
-        true = {} if self._true is None else self._true.columns
-        apart = vars(self._apart).values()
-        return [*self.log.columns.values(), *true.values(), *self._sent_ns.values(), *apart]
+    def _columns(self) -> Iterator[tuple[dict[Any, Any], Any, NDArray[Any]]]:
+        true = {} if self._true is None else vars(self._true)
+        tables: list[dict[Any, Any]] = [vars(self.log), true, vars(self._apart), self._sent_ns]
+        for table in tables:
+            columns = [item for item in table.items() if isinstance(item[1], np.ndarray)]
+            yield from ((table, name, column) for name, column in columns)
 
     def _grow(self, ticks: int) -> None:
         # memory that is not touched costs nothing, but a wrong stamp must not cost gigabytes
@@ -245,16 +259,23 @@ class Rows:
         if ticks <= before:
             return
         self._rows = max(ticks, int(_GROWTH * before))
-        for column in self._columns():
-            column.resize((self._rows, *column.shape[1:]), refcheck=False)
+        row_bytes = sum(8 * math.prod(column.shape[1:]) for _, _, column in self._columns())
+        for table, name, column in self._columns():
+            shape, key = (self._rows, *column.shape[1:]), (id(table), str(name))
+            if self._rows * row_bytes < FILES_FROM or not math.prod(shape):
+                column.resize(shape, refcheck=False)
+                continue
+            if not isinstance(column, np.memmap):
+                self._files[key] = tempfile.TemporaryFile()  # noqa: SIM115 - it lasts as the log
+                column.tofile(self._files[key])
+            self._files[key].truncate(8 * math.prod(shape))
+            table[name] = np.memmap(self._files[key], column.dtype, "r+", shape=shape)
+        for _, _, column in self._columns():
             column[before:] = _NEVER if column.dtype == np.int64 else np.nan
 
 
 def _by_place(ticks: Integers, rows: Array, stop: int) -> tuple[slice | Places, Array]:
-    """Find where (M, k, width) rows of messages go in a log of ``stop`` rows, and those that do.
-
-    Of several for one place the last one stays.
-    """
+    """Find where (M, k, width) rows of messages go in a log of ``stop`` rows; the last stays."""
     length = rows.shape[1]
     places: Places = (ticks[:, None] + np.arange(length)).reshape(-1)
     rows = rows.reshape(len(places), -1)

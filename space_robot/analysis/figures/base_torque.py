@@ -11,9 +11,12 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure, FigureBase
 from numpy.typing import NDArray
+from typing_extensions import Self
 
+from space_robot_msgs_py.bag.flight_log import FlightLog
+
+from ..errors import junction_ticks
 from ..torques import CHATTER_FREQUENCY
-from .flight_curves import BaseTorque
 from .single_flight import BASE_AXES, JUNCTION_HALF_WIDTH
 from .style import (
     GREY,
@@ -39,15 +42,43 @@ SHORTEST = 64
 """Minimum number of samples of a spectrum."""
 
 
+class BaseTorque(NamedTuple):
+    """The base's torque over a flight: a fiftieth of its log, to hand from process to process."""
+
+    torque: Array
+    """(N, 3) N m, applied in the base frame."""
+    period: float
+    """s, of a tick."""
+    junctions: NDArray[np.intp]
+    """Rows at which one motion has ended and another begins."""
+    start: float = 0.0
+    """s, time of the first row: not 0 in an excerpt of a flight."""
+
+    @classmethod
+    def of(cls, log: FlightLog) -> Self:
+        """Copy it from a whole flight or an excerpt."""
+        period = log.timebase.period
+        return cls(
+            log.applied_torque[:, :3].copy(), period, junction_ticks(log), log.first_tick * period
+        )
+
+    @property
+    def time(self) -> Array:
+        """Times of the rows, (N,) s."""
+        return self.start + np.arange(len(self.torque), dtype=np.float64) * self.period
+
+    @property
+    def end(self) -> float:
+        """End of the flight, s."""
+        return self.start + len(self.torque) * self.period
+
+
 @house_style()
 def junctions(flights: Mapping[str, BaseTorque]) -> Figure:
     """Draw the base torque x of all laws at the first junction of the mission's segments.
 
     All panels have the same scale. A law with a much larger range than most does not affect it: its
-    curve is cut off at the edges, and its heading has the range.
-
-    Args:
-        flights: of one mission, by name of the law.
+    curve is cut off at the edges, and its heading has the range. The flights are of one mission.
     """
     moments = [
         flight.start + flight.period * row
@@ -58,8 +89,8 @@ def junctions(flights: Mapping[str, BaseTorque]) -> Figure:
         return page(12.0, "None of these flights passes a junction of two segments.")
     columns = min(2, len(flights))
     figure = page(12.0 + 45.0 * math.ceil(len(flights) / columns))
-    stretch = _Stretch(slice(0, 1), min(moments), -JUNCTION_HALF_WIDTH, JUNCTION_HALF_WIDTH)
-    panels = _draw_side_by_side(figure, columns, flights, stretch)
+    interval = -JUNCTION_HALF_WIDTH, JUNCTION_HALF_WIDTH
+    panels = _draw_side_by_side(figure, columns, flights, min(moments), interval, 1)
     for axes in panels:
         mark_moments(axes, np.zeros(1))
     for axes in panels[::columns]:
@@ -73,9 +104,6 @@ def chatter(flights: Mapping[str, BaseTorque]) -> Figure:
 
     The interval begins at a quarter of the longest flight: when the arm is fastest, if the mission
     has two segments. Scale and headings are those of `junctions`.
-
-    Args:
-        flights: of one mission, by name of the law.
     """
     start = min(flight.start for flight in flights.values())
     moment = start + (max(flight.end for flight in flights.values()) - start) / 4.0
@@ -84,8 +112,9 @@ def chatter(flights: Mapping[str, BaseTorque]) -> Figure:
     figure = page(height + spectrum_height)
     parts = figure.add_gridspec(2, 1, height_ratios=(height, spectrum_height))
     above, below = figure.add_subfigure(parts[0]), figure.add_subfigure(parts[1])
-    stretch = _Stretch(slice(0, 3), moment, 0.0, CHATTER_STRETCH)
-    for axes in _draw_side_by_side(above, columns, flights, stretch, steps=True)[::columns]:
+    interval = 0.0, CHATTER_STRETCH
+    panels = _draw_side_by_side(above, columns, flights, moment, interval, 3, steps=True)
+    for axes in panels[::columns]:
         axes.set_ylabel("base torque (N m)")
     legend_above(above, BASE_AXES, dashed=False)
     spectra = {
@@ -101,11 +130,8 @@ def chatter(flights: Mapping[str, BaseTorque]) -> Figure:
 def power_spectral_density(values: Array, period: float) -> tuple[Array, Array]:
     """Estimate the power spectral density of all columns together by Welch's method.
 
-    The trend of each segment is removed, or slow motion would leak into the high frequencies.
-
-    Args:
-        values: (N, axes) samples; rows from the first that is not finite are ignored.
-        period: between two samples, s.
+    The trend of each segment is removed, or slow motion would leak into the high frequencies. Rows
+    of values (N, axes) from the first that is not finite are ignored; ``period`` is in s.
 
     Returns:
         Frequencies above 0, Hz, and the density in the square of the values' unit per Hz, NaN for
@@ -138,35 +164,21 @@ def _draw_spectra(axes: Axes, spectra: Mapping[str, tuple[Array, Array]]) -> Non
     axes.xaxis.set_major_formatter("{x:g}")
 
 
-class _Stretch(NamedTuple):
-    """Time interval shown in the panels."""
-
-    axes: slice
-    """Shown axes of the base's torque."""
-    moment: float
-    """Zero of the time axis, s."""
-    begin: float
-    """s from the moment."""
-    end: float
-    """s from the moment."""
-
-    def of(self, flight: BaseTorque) -> tuple[Array, Array]:
-        """Return time from ``moment``, s, and torque, N m; empty if the flight ended before."""
-        time = flight.time - self.moment
-        shown = (time > self.begin - 1e-9) & (time < self.end + 1e-9)
-        return time[shown], flight.torque[shown, self.axes]
-
-
 def _draw_side_by_side(
     figure: FigureBase,
     columns: int,
     flights: Mapping[str, BaseTorque],
-    stretch: _Stretch,
-    *,
+    moment: float,
+    interval: tuple[float, float],
+    axis_count: int,
     steps: bool = False,
 ) -> list[Axes]:
-    """Plot the interval of each flight in a separate panel, all on one scale."""
-    curves = {name: stretch.of(flight) for name, flight in flights.items()}
+    """Plot an interval from ``moment``, s, of each flight in a panel, all on one scale."""
+    curves = {}
+    for name, flight in flights.items():
+        time = flight.time - moment
+        shown = (time > interval[0] - 1e-9) & (time < interval[1] + 1e-9)
+        curves[name] = time[shown], flight.torque[shown, :axis_count]
     low, high = common_limits([torque for _, torque in curves.values()])
     panels = grid(figure, len(flights), columns)
     for number, (axes, (name, (time, torque))) in enumerate(
@@ -181,8 +193,8 @@ def _draw_side_by_side(
             )
         axes.set_title(plain(name + _cut(torque, low, high)))
         if number + columns >= len(panels):
-            axes.set_xlabel(f"time from {stretch.moment:g} s (ms)")
-    panels[0].set(xlim=(1e3 * stretch.begin, 1e3 * stretch.end), ylim=(low, high))
+            axes.set_xlabel(f"time from {moment:g} s (ms)")
+    panels[0].set(xlim=[1e3 * time for time in interval], ylim=(low, high))
     return panels
 
 

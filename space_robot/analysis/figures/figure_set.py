@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import base64
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
 from matplotlib.figure import Figure
+from typing_extensions import Self
 
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.bag.law_history import as_data, laws_of
@@ -17,8 +18,14 @@ from ..analysed_log import AnalysedLog, PointingBudget
 from ..plotted import KINDS, quantities_of
 from ..words import flown
 from .base_torque import chatter, junctions
-from .flight_curves import FlightCurves
-from .overlay import base_pointing, errors_and_torques, latency_histogram, pointing, ripple
+from .overlay import (
+    FlightCurves,
+    base_pointing,
+    errors_and_torques,
+    latency_histogram,
+    pointing,
+    ripple,
+)
 from .single_flight import control_results, desired_joints, kind_figure, limit_cycle
 from .style import save_figure
 
@@ -40,6 +47,11 @@ class Drawing(NamedTuple):
 
     caption: str
     draw: Callable[[], Figure]
+
+    @classmethod
+    def of(cls, caption: str, figure: Figure) -> Self:
+        """Return a figure that is drawn already."""
+        return cls(caption, lambda: figure)
 
 
 class FigureFolder(NamedTuple):
@@ -72,30 +84,24 @@ class FigureSet:
     def __init__(self, budget: PointingBudget | None = None) -> None:
         """``budget``: of the base's pointing; None: the default."""
         self._budget = budget or PointingBudget()
-        self._flights: dict[str, FlightCurves] = {}
+        self._curves: dict[str, FlightCurves] = {}
         self._missions: dict[bytes, tuple[str, Figure]] = {}
         self._first: Figure | None = None
-        self._parts: dict[str, dict[str, tuple[str, Figure]]] = {}
-        """Caption and figure by file name, of what each flight has: actuators, an orbit, gears."""
+        self._own: dict[str, dict[str, Drawing]] = {}
+        """By flight and file name, of what it has: actuators, an orbit, gears."""
 
     def add(self, name: str, log: FlightLog) -> None:
         """Add a flight."""
         reference = log.reference_joints[:: max(1, log.ticks // 100)]
         self._missions.setdefault(reference.tobytes(), (name, desired_joints(log)))
-        if not self._flights:
+        if not self._curves:
             self._first = control_results(log, title(name, log))
-        self._flights[name] = FlightCurves.of(log, self._budget)
-        if parts := _parts(log.longest_stretch()):
-            self._parts[name] = parts
+        self._curves[name] = FlightCurves.of(log, self._budget)
+        if own := dict(_own_drawings(log.longest_stretch())):
+            self._own[name] = own
 
     def save(self, folder: Path) -> list[SavedFigure]:
-        """Draw all figures into ``folder`` as PNG and SVG; existing files are replaced.
-
-        Figures without data are omitted.
-
-        Raises:
-            InputError: a figure cannot be written.
-        """
+        """Draw all figures with data into ``folder``, PNG and SVG; existing files are replaced."""
         return [
             SavedFigure(drawing.caption, save_figure(figure, folder / stem)[-1])
             for stem, drawing in self.drawings().items()
@@ -104,57 +110,52 @@ class FigureSet:
 
     def drawings(self) -> dict[str, Drawing]:
         """Return the available figures by file name, without drawing them."""
-        flights, drawings = self._flights, dict[str, Drawing]()
-        torques = {n: s.base_torque for n, s in flights.items() if s.base_torque is not None}
-
-        def add(stem: str, caption: str, draw: Callable[[], Figure]) -> None:
-            drawings[stem] = Drawing(caption, draw)
-
-        several = len(self._missions) > 1
+        curves, drawings = self._curves, dict[str, Drawing]()
+        torques = {n: c.base_torque for n, c in curves.items() if c.base_torque is not None}
         for number, (name, figure) in enumerate(self._missions.values(), start=1):
-            suffix, of = (f"_{number}", f" of {name}") if several else ("", "")
-            caption = f"Desired joint angles{of} (Fig. 5)"
-            add(f"desired_joints{suffix}", caption, partial(_drawn, figure))
-        if len(flights) == 1 and self._first is not None:
+            suffix, whose = (f"_{number}", f" of {name}") if len(self._missions) > 1 else ("", "")
+            caption = f"Desired joint angles{whose} (Fig. 5)"
+            drawings[f"desired_joints{suffix}"] = Drawing.of(caption, figure)
+        if len(curves) == 1 and self._first is not None:
             caption = "Errors and torques of base and joints (Figs. 6 to 9)"
-            add("control_results", caption, partial(_drawn, self._first))
+            drawings["control_results"] = Drawing.of(caption, self._first)
         else:
             caption = "Errors and torques, norms over each group of axes (Figs. 6 to 9)"
-            add("control_results", caption, partial(errors_and_torques, flights))
+            drawings["control_results"] = Drawing(caption, partial(errors_and_torques, curves))
         if torques:
-            add("junctions", "Base torque x where two motions meet", partial(junctions, torques))
-            caption = "A stretch of base torque, and its spectrum"
-            add("chatter", caption, partial(chatter, torques))
-        add("ripple", "Spectrum of the torques' ripple", partial(ripple, flights))
-        for number, (name, figures) in enumerate(self._parts.items(), start=1):
-            suffix, of = (f"_{number}", f" of {name}") if len(flights) > 1 else ("", "")
-            for stem, (caption, figure) in figures.items():
-                add(f"{stem}{suffix}", f"{caption}{of}", partial(_drawn, figure))
+            drawings |= {
+                "junctions": Drawing(
+                    "Base torque x where two motions meet", partial(junctions, torques)
+                ),
+                "chatter": Drawing(
+                    "A stretch of base torque, and its spectrum", partial(chatter, torques)
+                ),
+            }
+        drawings["ripple"] = Drawing("Spectrum of the torques' ripple", partial(ripple, curves))
+        for number, (name, own) in enumerate(self._own.items(), start=1):
+            suffix, whose = (f"_{number}", f" of {name}") if len(curves) > 1 else ("", "")
+            for stem, drawing in own.items():
+                caption = f"{drawing.caption}{whose}"
+                drawings[f"{stem}{suffix}"] = drawing._replace(caption=caption)
         if torques:
             caption = "The base's pointing error; dotted: the band"
-            add("base_pointing", caption, partial(base_pointing, flights))
+            drawings["base_pointing"] = Drawing(caption, partial(base_pointing, curves))
         caption = "The end effector's pointing error in the inertial frame"
-        add("pointing", caption, partial(pointing, flights))
+        drawings["pointing"] = Drawing(caption, partial(pointing, curves))
         caption = "Time from a state's sending to its command's"
-        add("latency", caption, partial(latency_histogram, flights))
+        drawings["latency"] = Drawing(caption, partial(latency_histogram, curves))
         return drawings
 
 
-def _drawn(figure: Figure) -> Figure:
-    return figure
-
-
-def _parts(log: FlightLog) -> dict[str, tuple[str, Figure]]:
-    """Return caption and figure by file name of what a flight has: actuators, orbit, gears."""
-    flight, parts = AnalysedLog(log), dict[str, tuple[str, Figure]]()
+def _own_drawings(log: FlightLog) -> Iterator[tuple[str, Drawing]]:
+    flight = AnalysedLog(log)
     for name, kind in KINDS.items() if log.ticks else ():
         drawn = [q for _, q in quantities_of(flight, [name]) if q.is_drawn] if kind.figure else []
         if drawn:
-            parts[kind.figure] = kind.caption, kind_figure(log, drawn)
-        if drawn and any(quantity.are_pulses for quantity in drawn):
+            yield kind.figure, Drawing.of(kind.caption, kind_figure(log, drawn))
+        if any(quantity.are_pulses for quantity in drawn):
             caption = "The attitude's limit cycle: rate error over attitude error"
-            parts["limit_cycle"] = caption, limit_cycle(log)
-    return parts
+            yield "limit_cycle", Drawing.of(caption, limit_cycle(log))
 
 
 def title(name: str, log: FlightLog) -> str:

@@ -2,16 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
+from contextlib import suppress
 from typing import NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
+from typing_extensions import Self
 
+from space_robot_msgs_py.bag.flight_log import FlightLog
+from space_robot_msgs_py.errors import InputError
+
+from ..analysed_log import AnalysedLog, PointingBudget
+from ..described import event_times
+from ..errors import AxisIndex
 from ..measure import column_label, column_unit
-from .flight_curves import FlightCurves, SizeCurve
+from ..plotted import PlottedQuantity, quantities_of
+from ..torques import RippleSpectrum, ripple_spectrum
+from .base_torque import BaseTorque
 from .style import (
     GREY,
     LineStyle,
@@ -21,50 +31,93 @@ from .style import (
     page,
     plot_lines,
     plot_spectrum,
+    total_variation,
 )
 
 Array = NDArray[np.float64]
 
+DRAWN = ("attitude", "joints", "pointing", "tool", "base", "torques")
+"""Kinds of quantities whose sizes are drawn over time."""
 USUAL = 0.5
 """Share of the ticks below the range of a logarithmic panel, %: errors begin at zero."""
 BINS = 80
 """Bins of the latency's histogram."""
 
 
+class FlightCurves(NamedTuple):
+    """Sizes of a flight's quantities over time, its base torque, ripple and latency."""
+
+    time: Array
+    """(N,) s."""
+    sizes: list[tuple[str, PlottedQuantity]]
+    """Kind and size of each quantity of `DRAWN`, its values (N, 1)."""
+    base_torque: BaseTorque | None
+    """None where nothing turned the base."""
+    latency_ms: Array | None
+    """(K,) of every answer, by the wall clock; None for flights without any."""
+    ripple: RippleSpectrum | None
+    """None where the robot is not known, or the flight is too short."""
+    torque_axes: dict[str, AxisIndex]
+    """The axes of each column of torques."""
+    events: Array
+    """Times of what was captured and released, s."""
+
+    @classmethod
+    def of(cls, log: FlightLog, budget: PointingBudget | None = None) -> Self:
+        """Compute them from a flight; ``budget``: of the base's pointing, None: the default."""
+        flight = AnalysedLog(log, budget)
+        ripple = latency = None
+        with suppress(InputError):
+            ripple = ripple_spectrum(flight)
+        if log.latency_s is not None:
+            known = log.latency_s[np.isfinite(log.latency_s)]
+            latency = 1e3 * known if len(known) else None
+        return cls(
+            log.time,
+            [(kind, sized(quantity)) for kind, quantity in quantities_of(flight, DRAWN)],
+            BaseTorque.of(log) if flight.controls_base else None,
+            latency,
+            ripple,
+            flight.torque_columns,
+            event_times(log),
+        )
+
+
+def sized(quantity: PlottedQuantity) -> PlottedQuantity:
+    """Return a quantity with its size at each tick as its only value."""
+    return quantity._replace(values=quantity.size[:, np.newaxis], wanted=None)
+
+
 class _Panel(NamedTuple):
     curves: dict[str, tuple[Array, Array]]
     """Time, s, and values of each flight with data for a panel."""
     label: str
-    is_logarithmic: bool
+    is_error: bool
+    """Drawn on a logarithmic scale."""
     limit: float
     """Drawn as a line across; 0: none."""
 
 
 @house_style()
 def errors_and_torques(flights: Mapping[str, FlightCurves]) -> Figure:
-    """Draw Figs. 6 to 9 of several flights: sizes of errors (left, logarithmic) and torques.
-
-    Args:
-        flights: by name.
-    """
-    errors = _panels(flights, lambda c: c.kind in ("attitude", "joints") and c.is_error)
-    torques = _panels(flights, lambda curve: curve.kind == "torques")
-    return _draw([errors, torques], flights)
+    """Draw Figs. 6 to 9 of several flights: sizes of errors (left, logarithmic) and torques."""
+    errors = [panel for panel in _panels(flights, "attitude", "joints") if panel.is_error]
+    return _draw([errors, _panels(flights, "torques")], flights)
 
 
 @house_style()
 def pointing(flights: Mapping[str, FlightCurves]) -> Figure:
     """Draw the end effector's errors of boresight, rotation and position, and the base's drift."""
-    panels = _panels(flights, lambda curve: curve.kind == "tool")
+    panels = _panels(flights, "tool")
     if not panels:
         return page(12.0, "No robot is known for these flights, so no pointing error.")
-    return _draw([panels + _panels(flights, lambda curve: curve.kind == "base")], flights)
+    return _draw([panels + _panels(flights, "base")], flights)
 
 
 @house_style()
 def base_pointing(flights: Mapping[str, FlightCurves]) -> Figure:
     """Draw the base's pointing errors and the band: half cone, about the axis that points, all."""
-    panels = _panels(flights, lambda curve: curve.kind == "pointing")
+    panels = _panels(flights, "pointing")
     if not panels:
         return page(12.0, "Nothing turned the base of these flights, so no pointing error.")
     return _draw([panels], flights)
@@ -101,11 +154,7 @@ def latency_histogram(flights: Mapping[str, FlightCurves]) -> Figure:
 
 @house_style()
 def ripple(flights: Mapping[str, FlightCurves]) -> Figure:
-    """Draw the spectral density of the ripple, one panel per group of axes (mean of the axes).
-
-    Args:
-        flights: by name.
-    """
+    """Draw the spectral density of the ripple, one panel per group of axes (mean of the axes)."""
     known = {name: s.ripple for name, s in flights.items() if s.ripple is not None}
     if not known:
         return page(12.0, "None of these flights has a known robot and is long enough for ripple.")
@@ -134,7 +183,6 @@ def ripple(flights: Mapping[str, FlightCurves]) -> Figure:
 
 
 def _draw(columns: list[list[_Panel]], flights: Mapping[str, FlightCurves]) -> Figure:
-    """Plot columns of equally many panels over time, with one legend of all flights."""
     rows, names = len(columns[0]), list(flights)
     events = np.unique(np.concatenate([curves.events for curves in flights.values()]))
     figure = page(18.0 + 38.0 * rows)
@@ -150,12 +198,12 @@ def _draw(columns: list[list[_Panel]], flights: Mapping[str, FlightCurves]) -> F
 
 
 def _draw_panel(axes: Axes, panel: _Panel, names: list[str]) -> None:
-    wildest_first = sorted(panel.curves, key=lambda name: -_roughness(panel.curves[name][1]))
+    wildest_first = sorted(panel.curves, key=lambda name: -total_variation(panel.curves[name][1]))
     for depth, name in enumerate(wildest_first):  # at the back, so that it does not hide the others
         time, value = panel.curves[name]
         plot_lines(axes, time, value[:, np.newaxis], looks=[names.index(name)], dashed=True)
         axes.get_lines()[-1].set_zorder(2.0 + 0.01 * depth)
-    if panel.is_logarithmic:
+    if panel.is_error:
         known = [value[value > 0.0] for _, value in panel.curves.values()]
         usual = [float(np.percentile(value, USUAL)) for value in known if len(value)]
         if usual:
@@ -167,18 +215,11 @@ def _draw_panel(axes: Axes, panel: _Panel, names: list[str]) -> None:
     axes.set_ylabel(panel.label)
 
 
-def _roughness(values: Array) -> float:
-    return float(np.nansum(np.abs(np.diff(values))))
-
-
-def _panels(
-    flights: Mapping[str, FlightCurves], is_wanted: Callable[[SizeCurve], bool]
-) -> list[_Panel]:
-    """Return a panel for every wanted quantity that any flight has."""
+def _panels(flights: Mapping[str, FlightCurves], *kinds: str) -> list[_Panel]:
     panels: dict[str, _Panel] = {}
     for name, curves in flights.items():
-        for curve in filter(is_wanted, curves.sizes):
-            limit = max(curve.limits, default=0.0)
-            panel = panels.setdefault(curve.label, _Panel({}, curve.label, curve.is_error, limit))
-            panel.curves[name] = curves.time, curve.size
+        for quantity in (quantity for kind, quantity in curves.sizes if kind in kinds):
+            label, limit = quantity.label, max(quantity.limits, default=0.0)
+            panel = panels.setdefault(label, _Panel({}, label, quantity.is_error, limit))
+            panel.curves[name] = curves.time, quantity.values[:, 0]
     return list(panels.values())

@@ -1,8 +1,9 @@
-"""Figures of one flight: the paper's Fig. 5 and Figs. 6 to 9, and those of plotted quantities."""
+"""Figures of one flight, the paper's Fig. 5 to 9 and those of plotted quantities, and of a plan."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import Path
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -11,14 +12,15 @@ from matplotlib.gridspec import GridSpec
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
-from space_robot.analysis.errors import relative_rate
+from space_robot_model.robot import Robot
 from space_robot_msgs_py.bag.flight_log import FlightLog
 
 from ..analysed_log import AnalysedLog
 from ..described import event_times
-from ..errors import attitude_angles, tracking_error
+from ..errors import attitude_angles, junction_ticks, relative_rate, tracking_error, waypoint_ticks
+from ..mission_plan import PlannedSegment
+from ..plotted import AXES as XYZ
 from ..plotted import PlottedQuantity, quantities_of
-from ..waypoints import junction_ticks, waypoint_ticks
 from .style import (
     GREY,
     PAGE_WIDTH,
@@ -29,6 +31,7 @@ from .style import (
     mark_moments,
     page,
     plot_lines,
+    save_figure,
 )
 
 Array = NDArray[np.float64]
@@ -74,11 +77,7 @@ def control_results(log: FlightLog, title: str) -> Figure:
 
     Below, the torques are enlarged at the junctions of the mission's segments that the flight has
     reached; vertical lines are captures and releases. Without base actuators the base's drift is
-    shown instead of its error.
-
-    Args:
-        log: a flight, complete or not.
-        title: of the figure.
+    shown instead of its error. The flight need not be complete.
     """
     (_, attitude), *_ = quantities_of(AnalysedLog(log), ["attitude"])
     error, torque, time = tracking_error(log)[:, 3:], log.applied_torque, log.time
@@ -111,7 +110,6 @@ def control_results(log: FlightLog, title: str) -> Figure:
 
 
 def _joint_labels(log: FlightLog) -> tuple[str, str]:
-    """Return the labels of the joints' errors and torques, with the units of the joints."""
     slides = log.prismatic[: len(log.joint_names)]
     if all(slides):
         return "joint error (m)", "joint force (N)"
@@ -125,7 +123,6 @@ def _joint_labels(log: FlightLog) -> tuple[str, str]:
 def _enlarge(
     figure: Figure, cells: GridSpec, column: int, moments: Array, time: Array, torque: Array
 ) -> Axes:
-    """Plot the torque at the junctions side by side on one scale; return the first panel."""
     below = cells[2, column].subgridspec(1, len(moments))
     panels = below.subplots(sharey=True, squeeze=False)[0].tolist()
     for axes, moment in zip(panels, moments, strict=True):
@@ -171,7 +168,6 @@ def kind_figure(log: FlightLog, quantities: Sequence[PlottedQuantity]) -> Figure
 
 
 def _draw_pulses(axes: Axes, time: Array, is_open: Array, period: float) -> None:
-    """Draw one row per thruster, dark where it is open."""
     length = max(1, -(-len(time) // BINS))
     starts = np.arange(0, len(time), length)
     counts = np.diff(np.append(starts, len(time)))
@@ -211,3 +207,27 @@ def limit_cycle(log: FlightLog) -> Figure:
     axes.set(xlabel="attitude error (deg)", ylabel="rate error (deg/s)")
     legend_above(figure, BASE_AXES, dashed=False)
     return figure
+
+
+@house_style()
+def draw_plan(robot: Robot, segments: Sequence[PlannedSegment], stem: Path) -> tuple[Path, ...]:
+    """Draw the plan to ``stem``.svg and ``stem``.png."""
+    demands = [segment.demand for segment in segments]
+    time = [asked.time for asked in demands]
+    tool_time = [np.linspace(s.piece.begin, s.piece.end, len(s.tool)) for s in segments]
+    joints = [robot.to_degrees(asked.joints[:, 0]) for asked in demands]
+    figure = page(200.0)
+    axes = figure.subplots(4, 1, sharex=True)
+    panels = (
+        (time, joints, "joints (deg)", robot.joint_names),
+        (tool_time, [segment.tool for segment in segments], "tool (m)", XYZ),
+        (time, [asked.torque[:, :3] for asked in demands], "base torque (N m)", XYZ),
+        (time, [asked.momentum for asked in demands], "momentum (N m s)", XYZ),
+    )
+    for panel, (at, values, label, names) in zip(axes, panels, strict=True):
+        plot_lines(panel, np.concatenate(at), np.concatenate(values))
+        panel.set_ylabel(label)
+        legend_above(panel, list(names), dashed=False)
+        mark_moments(panel, np.array([segment.piece.end for segment in segments[:-1]]))
+    axes[-1].set_xlabel("time (s)")
+    return save_figure(figure, stem)

@@ -61,11 +61,7 @@ class LineStyle(NamedTuple):
     @classmethod
     def of(cls, index: int) -> LineStyle:
         """Return the style of the line ``index``; 63 lines have distinct colour and marker."""
-        return cls(
-            COLOURS[index % len(COLOURS)],
-            MARKERS[index % len(MARKERS)],
-            DASHES[index % len(DASHES)],
-        )
+        return cls(*(styles[index % len(styles)] for styles in (COLOURS, MARKERS, DASHES)))
 
 
 def page(height: float, title: str = "") -> Figure:
@@ -103,17 +99,15 @@ def plot_lines(
         steps: draw each value as constant since the previous sample.
     """
     looks = range(values.shape[1]) if looks is None else looks
-    shown = np.where(np.isfinite(values), values, np.nan)
-    with np.errstate(over="ignore"):
-        roughness = np.nansum(np.abs(np.diff(shown, axis=0)), axis=0)
-    for depth, column in enumerate(np.argsort(-roughness, kind="stable").tolist()):
-        index = looks[column]
+    wildness = np.array([total_variation(column) for column in values.T])
+    for depth, column in enumerate(np.argsort(-wildness, kind="stable").tolist()):
+        index, shown = looks[column], _finite(values[:, column])
         look = LineStyle.of(index)
         marked = scattered(len(x), index, max(looks) + 1) if marks is None else marks
-        drawn = np.union1d(thinned(shown[:, column]), marked)
+        drawn = np.union1d(thinned(shown), marked)
         axes.plot(
             x[drawn],
-            shown[drawn, column],
+            shown[drawn],
             color=look.colour,
             linestyle=look.dashes if dashed else "-",
             marker=look.marker,
@@ -121,6 +115,16 @@ def plot_lines(
             zorder=2.0 + 0.01 * depth,
             drawstyle="steps-pre" if steps else "default",
         )
+
+
+def _finite(column: Array) -> Array:
+    return np.where(np.isfinite(column), column, np.nan)
+
+
+def total_variation(column: Array) -> float:
+    """Return the way up and down of the finite values of a column."""
+    with np.errstate(over="ignore"):
+        return float(np.nansum(np.abs(np.diff(_finite(column)))))
 
 
 def thinned(signal: Array, stretches: int = STRETCHES) -> Indices:
@@ -163,28 +167,23 @@ def plot_spectrum(axes: Axes, frequency: Array, density: Array, index: int, coun
     )
 
 
-def mark_moments(axes: Axes, moments: Array) -> None:
-    """Draw dotted vertical lines at ``moments``, in the unit of the horizontal axis."""
+def mark_moments(axes: Axes, moments: Array, linestyle: str = ":") -> None:
+    """Draw vertical lines at ``moments``, in the unit of the horizontal axis."""
     for moment in moments:
-        axes.axvline(moment, color=GREY, linewidth=0.8, linestyle=":", zorder=1.5)
+        axes.axvline(moment, color=GREY, linewidth=0.8, linestyle=linestyle, zorder=1.5)
 
 
 def mark_events(axes: Axes, times: Array) -> None:
     """Draw vertical lines at the ``times`` of captures and releases, s."""
-    for time in times:
-        axes.axvline(time, color=GREY, linewidth=0.8, zorder=1.5)
+    mark_moments(axes, times, "-")
 
 
 def legend_above(
     where: Axes | FigureBase, names: Sequence[str], *, dashed: bool, width: float = PAGE_WIDTH - 20
 ) -> Legend:
-    """Draw a legend above a figure or a panel.
+    """Draw a legend of lines, in the order of their styles, above a figure or a panel.
 
-    Args:
-        where: figure, part of a figure, or panel.
-        names: of the lines, in the order of their styles.
-        dashed: as in `plot_lines`.
-        width: available width, mm.
+    ``dashed``: as in `plot_lines`; ``width``: what is available, mm.
     """
     names = [shortened(name, MOST_LETTERS) for name in names]
     looks = [LineStyle.of(index) for index in range(len(names))]
@@ -202,7 +201,6 @@ def legend_above(
 
 
 def _columns(names: Sequence[str], width: float) -> int:
-    """Return the number of columns with which a legend of ``names`` fits into ``width`` mm."""
     entries = [11.0 + 1.6 * len(name) for name in names]
     for columns in range(len(names), 1, -1):
         if sum(max(column) for column in np.array_split(entries, columns)) <= width:
@@ -211,14 +209,7 @@ def _columns(names: Sequence[str], width: float) -> int:
 
 
 def grid(figure: FigureBase, count: int, columns: int, *, shared: bool = True) -> list[Axes]:
-    """Return ``count`` panels in rows of ``columns``.
-
-    Args:
-        figure: to divide.
-        count: of panels.
-        columns: panels per row.
-        shared: common scales, with tick labels at the outer panels only.
-    """
+    """Return ``count`` panels in rows of ``columns``; ``shared``: their scales are common."""
     cells = figure.add_gridspec(max(1, -(-count // columns)), columns)
     panels: list[Axes] = []
     for number in range(count):
@@ -234,15 +225,9 @@ def grid(figure: FigureBase, count: int, columns: int, *, shared: bool = True) -
 
 @house_style()
 def save_figure(figure: Figure, stem: Path, *, png: bool = True) -> tuple[Path, ...]:
-    """Write ``stem``.svg and, if ``png``, ``stem``.png; equal figures give equal bytes.
+    """Write ``stem``.svg and, if ``png``, ``stem``.png; return the files, the SVG last.
 
-    Existing files are replaced.
-
-    Returns:
-        The files, the SVG last.
-
-    Raises:
-        InputError: they cannot be written.
+    Equal figures give equal bytes. Existing files are replaced; InputError: they cannot be.
     """
     if not stem.name:
         raise InputError(f"{stem}: is a folder; choose a file name, without suffix")

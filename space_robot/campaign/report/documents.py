@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import yaml
 from rich.console import Console
 
-from space_robot.analysis.page import template
+from space_robot.analysis.report import template
 
 from ...analysis.figures.figure_set import Drawing, SavedFigure
 from ...analysis.figures.style import save_figure

@@ -17,11 +17,11 @@ from strategies import random_log
 
 from space_robot import Scenario
 from space_robot.analysis import analyze, excerpt, tracking_error
+from space_robot.analysis.actuation import settling
 from space_robot.analysis.analysed_log import AnalysedLog
-from space_robot.analysis.errors import neglected_force
+from space_robot.analysis.errors import junction_ticks, neglected_force, waypoint_ticks
 from space_robot.analysis.estimate_error import PairFilter, errors_of, recorded_h_bar, smoothing_of
 from space_robot.analysis.report_tables import comparison_table, rms_table
-from space_robot.analysis.waypoints import junction_ticks, settling, waypoint_ticks
 from space_robot.flight.flown_log import empty_log
 from space_robot.flight.plan import Flight, resolve
 from space_robot_msgs_py.bag.flight_log import FlightLog

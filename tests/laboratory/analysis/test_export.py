@@ -26,7 +26,7 @@ from space_robot.analysis.export import (
     write_parquet,
 )
 from space_robot.analysis.own_metric import SESSION, call, check_names, function_of, parse, text_of
-from space_robot.analysis.page import render
+from space_robot.analysis.report import render
 from space_robot.cli.main import cli
 from space_robot.console.files import atomic_file
 from space_robot_msgs_py.bag.flight_log import FlightLog

@@ -37,10 +37,13 @@ from space_robot.analysis.figures import (
     pointing,
     save_figure,
 )
-from space_robot.analysis.figures.base_torque import common_limits, power_spectral_density
+from space_robot.analysis.figures.base_torque import (
+    BaseTorque,
+    common_limits,
+    power_spectral_density,
+)
 from space_robot.analysis.figures.figure_set import FigureSet
-from space_robot.analysis.figures.flight_curves import BaseTorque, FlightCurves
-from space_robot.analysis.figures.overlay import base_pointing
+from space_robot.analysis.figures.overlay import FlightCurves, base_pointing
 from space_robot.analysis.figures.style import LineStyle, house_style, thinned
 from space_robot.analysis.momentum import momentum_of
 from space_robot.analysis.plotted import PlottedQuantity, quantities_of
@@ -299,12 +302,14 @@ def test_each_panel_has_a_line_a_flight_over_its_time(overlaid: dict[str, Flight
     front = max(torque.get_lines(), key=lambda line: line.get_zorder())
     assert rough[front.get_color()] == min(rough.values())
     assert error.get_yscale() == "log"
-    sizes = [curves.sizes[0].size for curves in overlaid.values()]
+    sizes = [curves.sizes[0][1].size for curves in overlaid.values()]
     lowest = min(np.percentile(size[size > 0.0], 0.5) for size in sizes)
     assert error.get_ylim()[0] == pytest.approx(0.5 * lowest)
     assert error.get_ylabel() == "attitude error (deg)"
     unknown = {
-        name: curves._replace(sizes=[c for c in curves.sizes if c.kind == "joints"])
+        name: curves._replace(
+            sizes=[(kind, size) for kind, size in curves.sizes if kind == "joints"]
+        )
         for name, curves in overlaid.items()
     }
     assert not pointing(unknown).axes

@@ -22,14 +22,15 @@ from space_robot.analysis import Window, analyze, describe, measure, tracking_er
 from space_robot.analysis.analysed_log import AnalysedLog
 from space_robot.analysis.described import robot_of
 from space_robot.analysis.errors import (
-    angles_of,
     attitude_angles,
     attitude_drift,
     axis_groups,
     controls_base,
+    quaternions_of,
+    rotation_vectors,
 )
 from space_robot.analysis.figures import ripple
-from space_robot.analysis.figures.flight_curves import FlightCurves
+from space_robot.analysis.figures.overlay import FlightCurves
 from space_robot.analysis.figures.style import LineStyle
 from space_robot.analysis.measure import all_metrics, label, names
 from space_robot.analysis.report_tables import comparison_table, rms_table
@@ -206,7 +207,8 @@ def test_the_angles_are_those_of_the_rotation_from_the_desired_attitude(attitude
         np.testing.assert_allclose(found, -expected, atol=1e-11)
         np.testing.assert_allclose(vector, -quaternion[:3], atol=1e-15)
         if np.linalg.norm(vector) < 0.9:
-            np.testing.assert_allclose(angles_of(vector[np.newaxis])[0], -expected, atol=1e-11)
+            (turned_by,) = np.degrees(rotation_vectors(quaternions_of(vector[np.newaxis])))
+            np.testing.assert_allclose(turned_by, -expected, atol=1e-11)
 
 
 @given(st.integers(0, 2**32 - 1))

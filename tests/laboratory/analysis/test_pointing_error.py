@@ -166,13 +166,14 @@ def test_the_bases_figures_are_those_of_plain_loops() -> None:
 def test_the_axis_that_points_is_that_of_the_first_pointing_segment(
     segments: list[str], axis: tuple[float, float, float]
 ) -> None:
-    assert PointingBudget().of(segments).axis == pytest.approx(axis)
-    axis = pointed_axis(segments)
-    assert axis is None or np.linalg.norm(axis) > 0.0
+    pointed = pointed_axis(segments)
+    assert PointingBudget().along(pointed).axis == pytest.approx(axis)
+    assert pointed is None or np.linalg.norm(pointed) > 0.0
     start = '{"point": "nadir", "axis": [0, 2, 0]}'
-    assert PointingBudget().of([], start).axis == [0.0, 1.0, 0.0]
-    assert PointingBudget().of(MISSIONS[0][0], start).axis == pytest.approx([0.0, 0.6, 0.8])
-    assert PointingBudget(axis=[5, 0, 0]).of(segments, start).axis == [1.0, 0.0, 0.0]
+    assert PointingBudget().along(pointed_axis([], start)).axis == [0.0, 1.0, 0.0]
+    pointed = pointed_axis(MISSIONS[0][0], start)
+    assert PointingBudget().along(pointed).axis == pytest.approx([0.0, 0.6, 0.8])
+    assert PointingBudget(axis=[5, 0, 0]).along(pointed).axis == [1.0, 0.0, 0.0]
     with pytest.raises(ValueError, match="axis must have a norm"):
         PointingBudget(axis=[0, 0, 0])
 

@@ -18,7 +18,7 @@ from strategies import random_log
 from space_robot import Scenario
 from space_robot.analysis import analyze, describe, measure
 from space_robot.analysis.actuation import deflection
-from space_robot.analysis.described import NotDescribedError, orbit_of, robot_of
+from space_robot.analysis.described import NotDescribedError, plant_settings, robot_of
 from space_robot.analysis.momentum import momentum_of
 from space_robot.analysis.report_tables import comparison_table, metrics_table, rms_table
 from space_robot.console.tables import NONE, Table
@@ -167,7 +167,7 @@ def test_on_orbit_and_with_gears_there_are_more_rows(driven: FlightLog) -> None:
 
 
 def test_robot_and_orbit_are_those_that_flew(driven: FlightLog) -> None:
-    robot, orbit = robot_of(driven), orbit_of(driven)
+    robot, orbit = robot_of(driven), plant_settings(driven)
     assert geared_joints(robot) == [1, 2, 4]
     assert robot.geared_names == driven.geared_names == ("joint2", "joint3", "joint5")
     assert [plate.area for plate in robot.plates] == [plate["area"] for plate in PLATES]

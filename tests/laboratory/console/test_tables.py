@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from space_robot.analysis.page import template
+from space_robot.analysis.report import template
 from space_robot.console import progress
 from space_robot.console.tables import Column, Group, JudgedCell, Table, as_markdown
 from space_robot.console.terminal import say, terminal

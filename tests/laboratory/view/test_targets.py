@@ -154,7 +154,7 @@ def test_a_target_on_an_orbit_falls_as_the_plant_has_it(
     grasp = Grasp.of(paper_robot, target_of(**motion))
     place = held_poses(grasp, log.rows(30, 31), paper_robot)[0][0]
     target = meeting_target(orbit, 3.0, place, **motion)
-    monkeypatch.setattr(drawing, "orbit_of", lambda log: orbit)
+    monkeypatch.setattr(drawing, "plant_settings", lambda log: orbit)
     moving = target.model_copy(update={"motion": target_state(target, orbit, 3.0).motion})
     met = replace(Capture(3.0, target), target=moving) if is_reached else None
     monkeypatch.setattr(drawing, "_as_met", lambda event, log: met)

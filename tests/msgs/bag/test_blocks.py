@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from space_robot.analysis import analyze
+from space_robot.analysis.analysed_log import excerpt
 from space_robot.analysis.estimate_error import HBar, errors_of, recorded_h_bar
-from space_robot.analysis.load_bag import excerpt
 from space_robot.flight.plan import Flight, Scenario, resolve
 from space_robot.flight.replay.run import RecordedLaws
 from space_robot.flight.simulate import simulate
@@ -46,7 +46,11 @@ def test_a_flight_in_memory_in_files_and_from_its_bag_is_the_same(
     assert isinstance(log.assumed_error, np.memmap)
     assert [path.name for path in tmp_path.iterdir()] == ["bag"]
     read = read_flight(tmp_path / "bag")
-    for one in (log, read):
+    monkeypatch.setattr("space_robot_msgs_py.bag.rows.FILES_FROM", 1000)
+    read_into_files = read_flight(tmp_path / "bag")
+    assert isinstance(read_into_files.reference_joints, np.memmap)
+    assert [path.name for path in tmp_path.iterdir()] == ["bag"]
+    for one in (log, read, read_into_files):
         assert one.measured is not None
         assert flown.measured is not None
         for name in COLUMNS:
@@ -57,7 +61,7 @@ def test_a_flight_in_memory_in_files_and_from_its_bag_is_the_same(
         np.testing.assert_array_equal(one.assumed_error, flown.assumed_error)
         assert one.laws == flown.laws
     np.testing.assert_array_equal(log.telemetry, flown.telemetry)
-    assert analyze(log) == analyze(flown) == analyze(read)
+    assert analyze(log) == analyze(flown) == analyze(read) == analyze(read_into_files)
 
 
 TIMEBASE = Timebase(500_000)
