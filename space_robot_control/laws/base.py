@@ -22,6 +22,7 @@ from space_robot_model.robot.kinematics import tool_state
 from space_robot_msgs_py.compiled.kernels import RecordFunction, keep_types
 from space_robot_msgs_py.compiled.records import (
     Block,
+    Field,
     Record,
     RecordOwner,
     RecordView,
@@ -34,7 +35,7 @@ from space_robot_msgs_py.config.validation import short
 from space_robot_msgs_py.errors import SpaceRobotError
 from space_robot_msgs_py.samples import LawInForce, Reference
 
-from .gains import AxisField, GainRange, LawGains, declared, per_axis
+from .gains import AxisField, GainRange, LawGains, per_axis
 
 Array = NDArray[np.float64]
 
@@ -187,19 +188,20 @@ class ControlLaw(RecordOwner, ABC):
     @classmethod
     def gain_descriptions(cls) -> dict[str, str]:
         """Return meaning and unit of each gain by its name for the user."""
-        return {name: field.description for name, field in declared(cls.gains_type).items()}
+        fields = cls.gains_type.fields().items()
+        return {name.rstrip("_"): f.description for name, f in fields if isinstance(f, Field)}
 
     @classmethod
     def gain_ranges(cls) -> dict[str, GainRange]:
         """Return where to search for each gain, by its name for the user, as far as declared."""
-        fields = declared(cls.gains_type).items()
-        return {n: f.range for n, f in fields if isinstance(f, AxisField) and f.range}
+        fields = cls.gains_type.fields().items()
+        return {n.rstrip("_"): f.range for n, f in fields if isinstance(f, AxisField) and f.range}
 
     @classmethod
     def optional_gains(cls) -> set[str]:
         """Return the names of the gains that are zero unless they are given."""
-        fields = declared(cls.gains_type).items()
-        return {n for n, f in fields if isinstance(f, AxisField) and f.is_optional}
+        fields = cls.gains_type.fields().items()
+        return {n.rstrip("_") for n, f in fields if isinstance(f, AxisField) and f.is_optional}
 
     @classmethod
     def required_gains(cls) -> set[str]:

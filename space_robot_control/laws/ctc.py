@@ -6,7 +6,7 @@ from space_robot_model.dynamics.rho_space import force_for
 from space_robot_msgs_py.compiled.kernels import kernel
 
 from .base import Array, CompiledLaw, Signals
-from .friction import IntegralMemory, add_friction, friction_gains, integral_gain, integrate, plus
+from .friction import IntegralMemory, add_error, add_friction, friction_gains, integral_gain, plus
 from .gains import LawGains, per_axis
 
 
@@ -23,7 +23,7 @@ class Gains(LawGains):
 def computed_torque(signals: Signals, gains: Gains, memory: IntegralMemory, period: float) -> None:
     """Compute one tick: u of (31), force of (30)."""
     e, edot, rhodd_d = signals.error, signals.error_rate, signals.acceleration_desired
-    integrate(e, gains.k_i, signals.applied_force, memory.force, memory.integral, period)
+    add_error(e, gains.k_i, signals.applied_force, memory.force, memory.integral, period)
     # u_PD of (31), and the integral
     for i in range(e.size):
         u_pd = rhodd_d[i] + gains.k_d[i] * edot[i] + gains.k_p[i] * e[i]

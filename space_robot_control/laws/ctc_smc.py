@@ -9,7 +9,7 @@ from space_robot_msgs_py.compiled.kernels import kernel
 from space_robot_msgs_py.compiled.lanes import where
 
 from .base import Array, CompiledLaw, Signals
-from .friction import IntegralMemory, add_friction, friction_gains, integral_gain, integrate, plus
+from .friction import IntegralMemory, add_error, add_friction, friction_gains, integral_gain, plus
 from .gains import LawGains, per_axis
 
 
@@ -32,7 +32,7 @@ def computed_torque_sliding_mode(
     """Compute one tick: s of (38), u, force of (57)."""
     e, edot, rhodd_d = signals.error, signals.error_rate, signals.acceleration_desired
     lam, s, u, force = gains.lambda_, memory.s, memory.u, memory.force
-    integrate(e, gains.k_i, signals.applied_force, force, memory.integral, period)
+    add_error(e, gains.k_i, signals.applied_force, force, memory.integral, period)
     for i in range(e.size):
         # s = edot + lambda e, (38), and the integral
         s[i] = plus(edot[i] + lam[i] * e[i], memory.integral[i])

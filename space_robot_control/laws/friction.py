@@ -71,7 +71,7 @@ class IntegralMemory(LawMemory):
 
 
 @kernel
-def integrate(
+def add_error(
     error: Array, k_i: Array, applied: Array, last_force: Array, integral: Array, period: float
 ) -> None:
     """Add a tick of ``K_I e`` to the integral (m,), except where it is held."""

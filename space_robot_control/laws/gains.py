@@ -54,23 +54,17 @@ def per_axis(
     Raises:
         ValueError: there is no such range.
     """
-    found = None
+    span = None
     if search is not None:
         lower, upper = search
         if scale not in ("log", "linear") or not 0.0 <= lower < upper < math.inf:
             raise ValueError(f"{description}: no range to search, {search}, {scale!r}")
         if scale == "log" and lower == 0.0:
             raise ValueError(f"{description}: a logarithmic search begins above 0, got {search}")
-        found = GainRange(lower, upper, scale, unit, per_inertia, is_optional)
+        span = GainRange(lower, upper, scale, unit, per_inertia, is_optional)
     text = ", ".join(filter(None, (description, unit)))
-    return AxisField(lambda n: (n + 3,), text, range=found, is_optional=is_optional)
+    return AxisField(lambda n: (n + 3,), text, range=span, is_optional=is_optional)
 
 
 class LawGains(Record):
     """Base class of a law's gains, each `per_axis`; users write ``lambda`` for ``lambda_``."""
-
-
-def declared(gains: type[LawGains]) -> dict[str, Field]:
-    """Return the declaration of each gain, by its name for the user."""
-    fields = gains.fields().items()
-    return {name.rstrip("_"): field for name, field in fields if isinstance(field, Field)}

@@ -5,7 +5,7 @@ from __future__ import annotations
 from space_robot_msgs_py.compiled.kernels import kernel
 
 from .base import Array, CompiledLaw, Signals
-from .friction import IntegralMemory, add_friction, friction_gains, integral_gain, integrate, plus
+from .friction import IntegralMemory, add_error, add_friction, friction_gains, integral_gain, plus
 from .gains import LawGains, per_axis
 
 
@@ -28,7 +28,7 @@ def proportional_derivative(
 ) -> None:
     """Compute one tick: the force; s and u are not used."""
     e, force = signals.error, memory.force
-    integrate(e, gains.k_i, signals.applied_force, force, memory.integral, period)
+    add_error(e, gains.k_i, signals.applied_force, force, memory.integral, period)
     for i in range(e.size):
         force[i] = gains.k_p[i] * e[i] + gains.k_d[i] * signals.error_rate[i]
         force[i] = plus(force[i], memory.integral[i])

@@ -14,7 +14,7 @@ from space_robot_msgs_py.compiled.kernels import kernel
 from space_robot_msgs_py.compiled.records import shaped
 
 from .base import Array, CompiledLaw, Signals
-from .friction import IntegralMemory, add_friction, friction_gains, integral_gain, integrate, plus
+from .friction import IntegralMemory, add_error, add_friction, friction_gains, integral_gain, plus
 from .gains import LawGains, per_axis
 
 
@@ -45,7 +45,7 @@ def feedforward(signals: Signals, gains: Gains, memory: Memory, period: float) -
     """
     inertia, bias = signals.nominal.inertia, signals.nominal.bias
     e, u, force, axes = signals.error, memory.u, memory.force, signals.error.size
-    integrate(e, gains.k_i, signals.applied_force, force, memory.integral, period)
+    add_error(e, gains.k_i, signals.applied_force, force, memory.integral, period)
     for i in range(axes):
         force[i] = gains.k_p[i] * e[i] + gains.k_d[i] * signals.error_rate[i]
         force[i] = plus(force[i], memory.integral[i])

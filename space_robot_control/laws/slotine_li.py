@@ -31,7 +31,7 @@ from space_robot_msgs_py.compiled.lanes import any_lane, uniform, where
 from space_robot_msgs_py.compiled.records import nested, shaped
 
 from .base import Array, CompiledLaw, Signals
-from .friction import IntegralMemory, add_friction, friction_gains, integral_gain, integrate, plus
+from .friction import IntegralMemory, add_error, add_friction, friction_gains, integral_gain, plus
 from .gains import LawGains, per_axis
 
 SLOWEST_ADAPTATION = 1e-30
@@ -101,7 +101,7 @@ def slotine_li(signals: Signals, gains: Gains, memory: Memory, period: float) ->
         is_new = is_new | (memory.spread[i] != gains.spread[i])
     if any_lane(is_new):
         bound_estimate(signals.model, gains, memory)
-    integrate(e, gains.k_i, signals.applied_force, force, memory.integral, period)
+    add_error(e, gains.k_i, signals.applied_force, force, memory.integral, period)
     for i in range(e.size):
         # v = rhodot_d + lambda e is s + rhodot; u is vdot; both with the integral
         s[i] = plus(edot[i] + gains.lambda_[i] * e[i], memory.integral[i])

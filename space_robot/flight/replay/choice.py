@@ -180,12 +180,10 @@ class ControllerChoice:
 
     def _recorded_gains(self, of_laws: Mapping[str, Tree]) -> dict[str, Any]:
         """The recorded gains by law, in place of a gain set that is not on this machine."""
-        parameters: dict[str, Any] = {
-            f"{name}.{gain}": [0.0]  # where a set has it today
-            for name in of_laws.keys() & laws()
-            for gain in laws()[name].optional_gains()
-        }
-        parameters |= dict(flatten(of_laws))
+        parameters = dict(flatten(of_laws))
+        for name in of_laws.keys() & laws():  # a set of today may have gains that none had
+            for gain in laws()[name].optional_gains():
+                parameters.setdefault(f"{name}.{gain}", [0.0])
         if of_laws and set(map(_swap_law, self._flown_swaps)) <= set(of_laws):
             parameters["gains"] = self.gains_name if self._has_gain_set() else DEFAULT
         return parameters
