@@ -90,7 +90,7 @@ def remarks(report: Report) -> list[str]:
         )
     remarks += _pointing(report["pointing"], metrics)
     remarks += _saturated_wheels(metrics)
-    remarks += [*_limit_cycles(metrics), *_standing_joints(metrics), *_beyond_limits(metrics)]
+    remarks += [*limit_cycles(metrics), *_standing_joints(metrics), *_beyond_limits(metrics)]
     remarks += [text for text in (report["unfinished"], *report["damage"]) if text]
     if report["unanswered_ticks"]:
         remarks.append(f"ticks that no command was recorded for: {report['unanswered_ticks']}")
@@ -127,7 +127,7 @@ def _saturated_wheels(metrics: Metrics) -> list[str]:
     ]
 
 
-def _limit_cycles(metrics: Metrics) -> list[str]:
+def limit_cycles(metrics: Metrics) -> list[str]:
     """Say which torques oscillate at one frequency, by more than a share of what they do."""
     cycles = [
         f"{name} at {metrics[f'{name}.ripple_peak_hz']:.3g} Hz with {peak:.2g} "
