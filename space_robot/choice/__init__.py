@@ -7,9 +7,11 @@
 | `front` | the search for the least error at each ripple |
 | `candidates` | one gain set a law, flown with many draws; who is out, and the ranks |
 | `choose` | all of it for a scenario |
-| `files` | gains, campaign, JSON and the page of a choice |
+| `gain_files`, `report` | its gains, campaign, tables, JSON and page |
+| `new_robot`, `robot_files` | the folder of a new robot, with the law chosen for it |
 """
 
 from .choose import Choice, ChoiceOptions, choose
+from .trials import Uncertainty
 
-__all__ = ["Choice", "ChoiceOptions", "choose"]
+__all__ = ["Choice", "ChoiceOptions", "Uncertainty", "choose"]

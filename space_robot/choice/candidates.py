@@ -17,7 +17,7 @@ from ..campaign.study import Study
 from ..campaign.verdicts.laws import PairedComparison, compare
 from ..flight.batch.batch import FlightBatch, batches
 from ..processes.executor import run_all
-from .criteria import CRITERIA, Criterion, Metrics
+from .criteria import CRITERIA, Criterion, Metrics, is_error
 from .search_space import GainPoint
 from .trials import Score, alone
 
@@ -37,6 +37,8 @@ class Candidate(NamedTuple):
     """The gain set with which a law takes part."""
 
     law: str
+    controller: str
+    """The law as an option of a scenario, such as ``file.py:Class``."""
     gains: GainPoint
     score: Score
     """Of its trials."""
@@ -72,6 +74,16 @@ class FlownCandidate:
     def median(self, function: Callable[[Metrics], float]) -> float:
         """Return the median of a number over the runs."""
         return float(np.median(self.values(function)))
+
+    @property
+    def rms(self) -> dict[str, float]:
+        """Median RMS errors over the runs that were flown."""
+        flown = [flight for flight in self.flights if flight]
+        errors = [name for name in flown[0] if is_error(name)] if flown else []
+        return {
+            name.removesuffix(".rms"): float(np.median([flight[name] for flight in flown]))
+            for name in errors
+        }
 
     @property
     def reason(self) -> str:
@@ -115,7 +127,7 @@ def fly_candidates(
         workers: see `run_many`.
         progress: see `run_all`.
     """
-    laws = [f"{c.law}={c.folder}" for c in candidates]
+    laws = [f"{c.controller}={c.folder}" for c in candidates]
     text = study.model_copy(update={"laws": laws}).model_dump_json(by_alias=True)
     groups = [tuple(range(k, min(k + GROUP, runs))) for k in range(0, runs, GROUP)]
     tasks = [Task(law, group) for group in groups for law in laws]

@@ -15,15 +15,16 @@ from space_robot_control.laws import find_law, laws
 from ..analysis.analysed_log import AnalysedLog
 from ..api import Scenario
 from ..campaign.gain_set import tuned_set, write_set
-from ..campaign.study import Study
+from ..campaign.study import Law, Study
 from ..campaign.verdicts.laws import PairedComparison
 from ..flight.flown_log import empty_log
-from ..flight.plan import Flight
+from ..flight.plan import Flight, resolve
 from ..processes.executor import run_all
+from ..tuning.method import Tuned
 from ..tuning.task import AUTO, TuningOptions, force_demand
 from .candidates import Candidate, FlownCandidate, comparisons, fly_candidates, ranked
 from .criteria import CRITERIA
-from .front import Front, search_front
+from .front import RIPPLE_WEIGHTS, Front, search_front
 from .gain_files import install, write_gains
 from .search_space import GainPoint, SearchSpace
 from .trials import Trials, Uncertainty
@@ -47,6 +48,8 @@ class ChoiceOptions:
     """That take part, also ``file.py:Class``; empty: all of this project."""
     evaluations: int = 240
     """Gain sets tried for each law."""
+    weights: tuple[float, ...] = RIPPLE_WEIGHTS
+    """Of the ripple in the search, see `front`."""
     longest_s: float = 12.0
     """Longest trial; of a longer mission the beginning is flown, s."""
     runs: int = 24
@@ -129,7 +132,7 @@ def choose(
     options: ChoiceOptions,
     command: str,
     progress: Progress,
-) -> Choice:
+) -> tuple[Choice, Tuned]:
     """Search the front of each law, fly a candidate of each with many draws, and rank them.
 
     Args:
@@ -139,30 +142,33 @@ def choose(
         command: the user's command, for the files' headers.
         progress: of the steps.
 
+    Returns:
+        The choice, and the gains from which the search began.
+
     Raises:
         InputError: the scenario cannot be flown, or it has no such law.
     """
     names = options.laws or tuple(sorted(laws()))
     known = {key: scenario[key] for key in TUNED if key in scenario}
     tuned = tuned_set(known, [str(scenario.get("case", "1"))], INITIAL_TUNING, lambda text: None)
-    write_set(tuned, command, folder / "start")
-    nominal = Scenario(**scenario, controller=first_known(names), gains=f"{folder}/start").check()
-    search = _Search(
-        dict(scenario), f"{folder}/start", tuned_points(tuned), torques_of(nominal), options
-    )
+    write_set(tuned, command, folder / TUNED_SET)
+    nominal = Scenario(
+        **scenario, controller=first_known(names), gains=f"{folder}/{TUNED_SET}"
+    ).check()
     with progress("fronts of the laws") as begin:
         found = run_all(search, names, min(options.workers, len(names)), begin)
-    fronts = dict(zip(names, found, strict=True))
+    fronts = {front.law: front for front in found}
     out: dict[str, str] = {}
     candidates = []
-    for law, front in fronts.items():
+    for law, front in zip(names, found, strict=True):
+        controller = Law.parse(law).controller
         tried = front.within(options.ripple)
         if tried is None:
-            out[law] = front.why_none(options.ripple)
+            out[front.law] = front.why_none(options.ripple)
             continue
         point = search.space(law).at(tried.point)
-        where = write_gains(law, point, folder / law, command, tried.score)
-        candidates.append(Candidate(law, point, tried.score, f"{where}/"))
+        where = write_gains(controller, point, folder, command, tried.score)
+        candidates.append(Candidate(front.law, controller, point, tried.score, f"{where}/"))
     study = study_of(scenario, nominal, options.uncertainty)
     with progress("flights of the candidates") as begin:
         flown = fly_candidates(
@@ -172,9 +178,12 @@ def choose(
     order = ranked(flown, criterion)
     out |= {each.law: each.reason for each in flown if each.reason}
     compared = comparisons(order, criterion) if order else []
-    return Choice(dict(scenario), options, fronts, flown, order, compared, out, study.vary)
+    found_law = Choice(dict(scenario), options, fronts, flown, order, compared, out, study.vary)
+    return found_law, tuned
 
 
+TUNED_SET = "tuned"
+"""Name of the set from which the search starts."""
 TUNED = ("robot", "mission", "sensors", "navigation", "orbit", "period", "parameters")
 """Options of a scenario that gains are tuned for."""
 
@@ -183,11 +192,6 @@ def has_estimate(law: str) -> bool:
     """Return True if a law has an estimate behind the low-pass of the set."""
     kind = find_law(law)
     return "h_bar" in kind.gain_descriptions() or kind.estimates_with_model
-
-
-def first_known(names: Sequence[str]) -> str:
-    """Return the first of some laws that this project has; else its default."""
-    return next((name for name in names if name in laws()), "tde_stc")
 
 
 def torques_of(flight: Flight) -> dict[str, float]:
@@ -206,7 +210,7 @@ def study_of(scenario: Mapping[str, Any], nominal: Flight, uncertainty: Uncertai
     )
 
 
-def tuned_points(tuned: Any) -> dict[str, GainPoint]:
+def tuned_points(tuned: Tuned) -> dict[str, GainPoint]:
     """Return the gains of a tuned set by law."""
     return {law: GainPoint(own.gains, tuned.corner_hz) for law, own in tuned.laws.items()}
 
@@ -223,20 +227,36 @@ class _Search:
 
     def __call__(self, law: str) -> Front:
         """Return the front of a law."""
-        options, scenario = self.options, self.scenario
-        given = Scenario(**scenario, controller=law, gains=self.gains)
-        duration = given.check().ticks * given.check().period
-        given = Scenario(
-            **{**scenario, "duration": min(duration, options.longest_s)},
-            controller=law,
-            gains=self.gains,
+        options, given = self.options, Scenario(**self.options_of(law))
+        flight = given.check()
+        duration = min(flight.ticks * flight.period, options.longest_s)
+        trials = Trials(
+            Scenario(**{**self.options_of(law), "duration": duration}),
+            options.uncertainty,
+            self.torques,
+            CRITERIA[options.criterion],
         )
-        trials = Trials(given, options.uncertainty, self.torques, CRITERIA[options.criterion])
-        return search_front(trials, self.space(law), options.evaluations, options.seed)
+        space = self.space(law)
+        return search_front(trials, space, options.evaluations, options.seed, options.weights)
+
+    def options_of(self, law: str) -> dict[str, Any]:
+        """Return the options of the scenario with a law."""
+        controller, gains = Law.parse(law)
+        own = gains if "=" in law else self.gains
+        return {**self.scenario, "controller": controller, "gains": own}
 
     def space(self, law: str) -> SearchSpace:
-        """Return the search space of a law."""
-        kind = find_law(law)
-        start = self.points[kind.name]
-        has_base = self.scenario.get("actuators") != "none"
-        return SearchSpace(kind, start, has_base, has_estimate(law))
+        """Return the search space of a law.
+
+        Raises:
+            InputError: nothing is known of its gains.
+        """
+        controller, has_base = Law.parse(law).controller, self.scenario.get("actuators") != "none"
+        start = self.points.get(controller)
+        if "=" in law:
+            scenario = resolve(Scenario(**self.options_of(law)))
+            corner = scenario.controller.acceleration_filter_hz
+            start = GainPoint(scenario.law.gain_values, corner)
+        if start is None:
+            raise InputError(f"law {controller}: has no tuned gains: give some, {controller}=GAINS")
+        return SearchSpace(find_law(controller), start, has_base, has_estimate(controller))

@@ -37,12 +37,13 @@ class Criterion(NamedTuple):
 
 def tracking_error(metrics: Metrics) -> float:
     """Return the geometric mean of the RMS errors of attitude and of each group of joints."""
-    errors = [
-        value
-        for name, value in metrics.items()
-        if name.endswith(".rms") and name.startswith(("attitude_angle.", "joints_"))
-    ]
+    errors = [value for name, value in metrics.items() if is_error(name)]
     return math.exp(sum(math.log(max(error, 1e-300)) for error in errors) / len(errors))
+
+
+def is_error(name: str) -> bool:
+    """Return True for the RMS error of the attitude or of a group of joints."""
+    return name.endswith(".rms") and name.startswith(("attitude_angle.", "joints_"))
 
 
 def _attitude(metrics: Metrics) -> float:

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from space_robot_control.controller.settings import DEFAULT_SETS, OF_THE_SET, OTHERS
+from space_robot_control.laws import find_law
 
 from ..console.files import make_folder, write_text
 from ..tuning.gain_file import gain_text, set_text
@@ -16,12 +17,23 @@ CHOSEN = "chosen"
 """Name of the set."""
 
 
-def write_gains(law: str, point: GainPoint, folder: Path, command: str, score: Score) -> Path:
+def write_gains(
+    controller: str, point: GainPoint, folder: Path, command: str, score: Score
+) -> Path:
     """Write the gains of a law as a set of its own; return its folder.
+
+    Args:
+        controller: the law, see `find_law`.
+        point: its gains.
+        folder: in which the set's folder is made, with the law's name.
+        command: the user's command, for the header.
+        score: of its trials.
 
     Raises:
         InputError: the folder cannot be created or written.
     """
+    law = find_law(controller).name
+    folder = folder / law
     make_folder(folder)
     comments = [
         f"Made by `{command}`.",
@@ -48,7 +60,8 @@ def install(choice_folder: Path, laws: Sequence[str], law: str, gains: Path) -> 
     Raises:
         InputError: a file cannot be written.
     """
-    folder = make_folder(gains / CHOSEN)
+    folder = gains / CHOSEN
+    make_folder(folder)
     for name in laws:
         text = (choice_folder / name / f"{name}.yaml").read_text("utf-8")
         write_text(text, folder / f"{name}.yaml", replace=True)

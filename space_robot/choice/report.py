@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +15,7 @@ from ..analysis.figures.figure_set import SavedFigure
 from ..analysis.figures.style import COLOURS, house_style, page, save_figure
 from ..analysis.page import template
 from ..console.files import make_folder, write_text
-from ..console.tables import Column, JudgedCell, Table
+from ..console.tables import Column, Group, JudgedCell, Table
 from ..console.terminal import json_text
 from ..processes.software import versions
 from .choose import Choice
@@ -29,7 +29,7 @@ SHARES = (0.001, 0.003, 0.01, 0.03, 0.1)
 """Ripples at which the table of fronts shows errors."""
 
 
-def candidates_table(choice: Choice) -> Table:
+def candidates_table(choice: Choice, notes: Sequence[str] = ()) -> Table:
     """Return the laws, the best one first, with what their candidates flew."""
     criterion = CRITERIA[choice.options.criterion]
     order = {each.law: number for number, each in enumerate(choice.order, 1)}
@@ -65,7 +65,7 @@ def candidates_table(choice: Choice) -> Table:
         Column("beside the first", is_label=True),
     ]
     title = f"{criterion.text}, {choice.options.runs} draws"
-    return Table.of(title, columns, rows)
+    return Table(title, columns, [Group(rows)], notes)
 
 
 def fronts_table(choice: Choice) -> Table:

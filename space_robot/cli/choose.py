@@ -9,13 +9,14 @@ from typing import Any
 import click
 
 from .completed_names import names_in
+from .gains import WORDS, TypedCommand
 from .numbers import FiniteRange
 from .options import flight_options, folder_option
 
 SECTION = "Gains and studies"
 
 
-@click.command()
+@click.command(cls=TypedCommand)
 @click.argument("robot", default="paper", shell_complete=names_in("robots"))
 @flight_options(
     *("mission", "case", "sensors", "navigation", "actuators", "orbit", "duration", "period"),
@@ -70,7 +71,10 @@ SECTION = "Gains and studies"
 )
 @click.option("--workers", type=click.IntRange(1), help="Processes [default: as many as cores].")
 @folder_option("--out", help="Folder to write [default: ROBOT/choice, choices/ROBOT if shipped].")
+@click.pass_context
 def choose(
+    context: click.Context,
+    /,
     robot: str,
     as_json: bool,
     criterion: str,
@@ -125,11 +129,11 @@ def choose(
     folder = out or (
         Path(robot) / "choice" if is_own and Path(robot).is_dir() else Path("choices") / files.name
     )
-    command = shlex.join(["space-robot", *typed])
+    command = shlex.join(["space-robot", "choose", *context.meta[WORDS]])
     compile_kernels()
-    choice = find_law(scenario, folder, wanted, command, counting_progress)
+    choice, _ = find_law(scenario, folder, wanted, command, counting_progress)
     page = write_report(choice, folder, command)
-    chosen = choice.install(folder, files.gains) if is_own and choice.law else None
+    chosen = choice.install(folder, files.gains) if is_own and files.gains and choice.law else None
     if as_json:
         echo_json(report(choice))
     else:
