@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from space_robot_control.laws import find_law, laws
+from space_robot_msgs_py.errors import InputError
 
 from ..analysis.analysed_log import AnalysedLog
 from ..api import Scenario
@@ -152,9 +153,9 @@ def choose(
     known = {key: scenario[key] for key in TUNED if key in scenario}
     tuned = tuned_set(known, [str(scenario.get("case", "1"))], INITIAL_TUNING, lambda text: None)
     write_set(tuned, command, folder / TUNED_SET)
-    nominal = Scenario(
-        **scenario, controller=first_known(names), gains=f"{folder}/{TUNED_SET}"
-    ).check()
+    search = _Search(dict(scenario), f"{folder}/{TUNED_SET}", tuned_points(tuned), {}, options)
+    nominal = Scenario(**search.options_of(names[0])).check()
+    search = replace(search, torques=torques_of(nominal))
     with progress("fronts of the laws") as begin:
         found = run_all(search, names, min(options.workers, len(names)), begin)
     fronts = {front.law: front for front in found}
