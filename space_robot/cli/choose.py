@@ -108,7 +108,7 @@ def choose(
     from ..console.progress import counting_progress
     from ..console.terminal import echo_json, terminal
     from ..console.terminal_tables import print_table
-    from ..flight.compilation import compile_kernels
+    from ..flight.batch.compilation import compile_lanes
     from ..processes.executor import cores
 
     wanted = ChoiceOptions(
@@ -130,7 +130,7 @@ def choose(
         Path(robot) / "choice" if is_own and Path(robot).is_dir() else Path("choices") / files.name
     )
     command = shlex.join(["space-robot", "choose", *context.meta[WORDS]])
-    compile_kernels()
+    compile_lanes()
     choice, _ = find_law(scenario, folder, wanted, command, counting_progress)
     page = write_report(choice, folder, command)
     chosen = choice.install(folder, files.gains) if is_own and files.gains and choice.law else None

@@ -212,7 +212,7 @@ def new_robot(
     from ..console.progress import counting_progress
     from ..console.terminal import echo_json, terminal
     from ..console.terminal_tables import print_table
-    from ..flight.compilation import compile_kernels
+    from ..flight.batch.compilation import compile_lanes
     from ..processes.executor import cores
 
     if base_inertia:
@@ -233,7 +233,7 @@ def new_robot(
         click.echo(f"repaired: {line}", err=True)
     folder = out or Path(files.name)
     check_replaceable(folder, force, texts)
-    compile_kernels()
+    compile_lanes()
     options = replace(SHORT, evaluations=evaluations, workers=cores())
     made = make_robot(texts, read, folder, command, counting_progress, options)
     click.echo(
