@@ -128,9 +128,11 @@ def parameters() -> str:
         if node == "controller":
             parts += [
                 "Each gain `<law>.<gain>` is a list, with one value per axis or one for all axes; "
-                "its default is in the gain set. Like `controller`, gains can be changed in "
-                "flight.",
-                table(("parameter", "description"), _gains()),
+                "its default is in the gain set; an optional one is 0 where the set lacks it. Like "
+                "`controller`, gains can be changed in flight. A search of gains looks in the "
+                "range given, of the gain or (x J) of the gain divided by the inertia of its "
+                "axis.",
+                table(("parameter", "search", "description"), _gains()),
             ]
     return "\n\n".join(parts) + "\n"
 
@@ -194,8 +196,12 @@ def _range(field: Any) -> str:
 
 def _gains() -> Iterator[Sequence[str]]:
     for name, law in laws().items():
+        ranges = law.gain_ranges()
         for gain, description in law.gain_descriptions().items():
-            yield f"`{name}.{gain}`", description.replace("|", "\\|")
+            span, optional = ranges[gain], " (optional)" if gain in law.optional_gains() else ""
+            looks = f"{span.lower:g} to {span.upper:g}{' x J' if span.per_inertia else ''}"
+            looks += "" if span.scale == "log" else ", linear"
+            yield f"`{name}.{gain}`", looks, description.replace("|", "\\|") + optional
 
 
 def faults() -> str:

@@ -30,6 +30,7 @@ class History:
     rho: Array
     rho_rate: Array
     applied: Array
+    rates_d: Array
 
     def __init__(self, axes: int, seed: int) -> None:
         rng = np.random.default_rng(seed)
@@ -43,6 +44,9 @@ class History:
         root = rng.normal(size=(TICKS, axes, axes))
         self.inertia = root @ root.transpose(0, 2, 1) + np.eye(axes)
         self.rho, self.rho_rate, self.applied = rng.normal(size=(3, *shape))
+        # of all sizes, some of them zero: inside the dead band and outside
+        self.rates_d = rng.normal(size=shape) * 10.0 ** rng.uniform(-2.0, 2.0, shape)
+        self.rates_d[rng.random(shape) < 0.1] = 0.0
 
     def block(self, k: int) -> Block:
         """The signals of a tick."""
@@ -53,6 +57,7 @@ class History:
         signals.nominal.inertia[:], signals.nominal.bias[:] = self.inertia[k], self.bias[k]
         signals.rho[:], signals.rho_rate[:] = self.rho[k], self.rho_rate[k]
         signals.applied_force[:] = self.applied[k]
+        signals.reference.joint_velocities[:] = self.rates_d[k, 3:]
         return block
 
     def at(self, k: int) -> Signals:
@@ -71,6 +76,28 @@ def sign_root(s: Array) -> Array:
     return root
 
 
+def friction(h: History, g: Gains) -> Array:
+    """The friction of the joints' desired motion; none on the base."""
+    moves = np.abs(h.rates_d) > g["dead_band"]
+    torque: Array = g["viscous"] * h.rates_d + g["coulomb"] * moves * np.sign(h.rates_d)
+    torque[:, :3] = 0.0
+    return torque
+
+
+def with_integral(h: History, g: Gains, law: Callable[[Array], Array]) -> Array:
+    """The forces of a law, of the integral of K_I e at every tick.
+
+    Each integral depends on the last force: where less than half of it was applied, what would
+    make it larger is not added.
+    """
+    integral, last = np.zeros_like(h.e), np.zeros_like(h.e[0])
+    for k in range(TICKS):
+        held = (np.abs(h.applied[k]) < 0.5 * np.abs(last)) & (last * h.e[k] > 0.0)
+        integral[k:] += np.where(held, 0.0, PERIOD * g["k_i"] * h.e[k])
+        last = law(integral)[k]
+    return law(integral)
+
+
 def pd_acceleration(h: History, g: Gains) -> Array:
     """u_PD of (31)."""
     return h.rhodd_d + g["k_d"] * h.edot + g["k_p"] * h.e
@@ -78,14 +105,20 @@ def pd_acceleration(h: History, g: Gains) -> Array:
 
 def ctc(h: History, g: Gains) -> Array:
     """(30), (31)."""
-    return h.through_model(pd_acceleration(h, g)) + h.bias
+    known = h.bias + friction(h, g)
+    return with_integral(h, g, lambda z: h.through_model(pd_acceleration(h, g) + z) + known)
 
 
 def ctc_smc(h: History, g: Gains) -> Array:
     """(57), (58)."""
-    s = h.edot + g["lambda"] * h.e
-    sat = np.where(np.abs(s) > g["delta"], np.sign(s), s / g["delta"])
-    return h.through_model(h.rhodd_d + g["lambda"] * h.edot) + h.bias + g["g"] * sat
+    u = h.rhodd_d + g["lambda"] * h.edot + g["k_i"] * h.e
+
+    def law(integral: Array) -> Array:
+        s = h.edot + g["lambda"] * h.e + integral
+        sat = np.where(np.abs(s) > g["delta"], np.sign(s), s / g["delta"])
+        return h.through_model(u) + h.bias + g["g"] * sat + friction(h, g)
+
+    return with_integral(h, g, law)
 
 
 def tde_smc(h: History, g: Gains) -> Array:
@@ -111,13 +144,20 @@ def tde_stc(h: History, g: Gains) -> Array:
 
 def pd(h: History, g: Gains) -> Array:
     """K_P e + K_D edot."""
-    return g["k_p"] * h.e + g["k_d"] * h.edot
+    torque = g["k_p"] * h.e + g["k_d"] * h.edot
+    return with_integral(h, g, lambda z: torque + z + friction(h, g))
 
 
 def pd_feedforward(h: History, g: Gains) -> Array:
     """``F = H_S u + c_S`` solved for u of the joints and F of the base, with u of the base and F
     of the joints known; PD is added on the base."""
-    force, axes = pd(h, g), h.e.shape[1]
+    torque = g["k_p"] * h.e + g["k_d"] * h.edot
+    return with_integral(h, g, lambda z: with_compensation(h, torque + z) + friction(h, g))
+
+
+def with_compensation(h: History, torque: Array) -> Array:
+    """PD's torque, on the base with that of the motion which it causes of the joints."""
+    force, axes = torque.copy(), h.e.shape[1]
     for k in range(TICKS):
         # unknowns: F_b, then u_q
         left = np.hstack([np.eye(axes)[:, :3], -h.inertia[k][:, 3:]])

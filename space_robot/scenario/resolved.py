@@ -68,7 +68,7 @@ class ResolvedScenario(FlightSettings):
     @property
     def gains_used(self) -> dict[str, list[float]]:
         """Gains of the law in force at the start, one value per axis."""
-        return {name: row.tolist() for name, row in self.law.gain_values.items()}
+        return {name: row.tolist() for name, row in self.law.given_gains.items()}
 
     @property
     def own_gains(self) -> list[str]:
@@ -99,7 +99,7 @@ class ResolvedScenario(FlightSettings):
         parameters["controller"] |= {
             f"{name}.{gain}": values.tolist()
             for name, law in self.laws.items()
-            for gain, values in law.gain_values.items()
+            for gain, values in law.given_gains.items()
         }
         return parameters
 
@@ -193,9 +193,9 @@ class ResolvedScenario(FlightSettings):
 
 def _gains(scenario: ResolvedScenario) -> Tree:
     return {
-        name: {gain: values.tolist() for gain, values in law.gain_values.items()}
+        name: {gain: values.tolist() for gain, values in law.given_gains.items()}
         for name, law in scenario.laws.items()
-        if name != NoLaw.name and law.gain_values
+        if name != NoLaw.name and law.given_gains
     }
 
 

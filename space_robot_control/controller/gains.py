@@ -45,18 +45,20 @@ def check_gains(
     """Return gains as (axes,) arrays; a list of one value applies to all axes.
 
     ``where`` names the source in errors; ``advice`` says what to do where the gains are for another
-    number of axes.
+    number of axes. Optional gains that are not in ``content`` are not in the result.
 
     Raises:
         InputError: a gain is missing, unknown, of the wrong length or out of its range.
     """
-    descriptions = law.gain_descriptions()
+    descriptions, optional = law.gain_descriptions(), law.optional_gains()
     for name in content:
         one_of(name, descriptions, f"gain of {law.name}", f" in {where}")
     gains = {}
     for name, description in descriptions.items():
         key = f"{where}: {law.name}.{name}"
         if name not in content:
+            if name in optional:
+                continue
             raise InputError(f"{key}: missing ({description})")
         values = _numbers(name, content[name])
         if values is None:
@@ -128,7 +130,7 @@ def build_law(
             values = {**law.gain_values, **overrides}
             copied.gain_values = check_gains(values, type(law), axes, PARAMETERS)
         return copied
-    may_lack = settings.gains == DEFAULT and (bool(overrides) or not law.gain_descriptions())
+    may_lack = settings.gains == DEFAULT and (bool(overrides) or not law.required_gains())
     files = _files_of(settings, may_lack)
     if law.name in files:
         gains = read_gains(files[law.name], law, axes)
@@ -165,7 +167,7 @@ def build_laws(
     overrides = overrides or {}
     first = own if not isinstance(own, str) else find_law(settings.controller)
     wanted: dict[str, str | type[ControlLaw] | ControlLaw] = {first.name: first}
-    brings_gains = isinstance(first, ControlLaw) or not first.gain_descriptions()
+    brings_gains = isinstance(first, ControlLaw) or not first.required_gains()
     available = available_laws(settings, brings_gains or first.name in overrides)
     for name in available or overrides:  # without a gain set, the gains given are all there are
         wanted.setdefault(name, name)

@@ -7,12 +7,14 @@ on PYTHONPATH as ``module:Class``.
 
 from __future__ import annotations
 
-from .base import CompiledLaw, ControlLaw, LawGains, LawMemory, Signals, per_axis
+from .base import CompiledLaw, ControlLaw, LawMemory, Signals
+from .gains import GainRange, LawGains, per_axis
 from .names import find_law, importable_name, laws
 
 __all__ = [
     "CompiledLaw",
     "ControlLaw",
+    "GainRange",
     "LawGains",
     "LawMemory",
     "Signals",

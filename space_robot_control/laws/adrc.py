@@ -19,15 +19,22 @@ import numpy as np
 from space_robot_msgs_py.compiled.kernels import kernel
 from space_robot_msgs_py.compiled.lanes import where
 
-from .base import Array, CompiledLaw, LawGains, LawMemory, Signals, per_axis
+from .base import Array, CompiledLaw, LawMemory, Signals
+from .gains import LawGains, per_axis
 
 
 class Gains(LawGains):
     """Inertia, and bandwidths of controller and observer."""
 
-    inertia: Array = per_axis("inertia J of each axis, 1/b_0", "kg m2")
-    omega_c: Array = per_axis("bandwidth of the controller: K_P = omega_c^2", "rad/s")
-    omega_o: Array = per_axis("observer: its poles are at 1/(1 + omega_o T), T: tick", "rad/s")
+    inertia: Array = per_axis(
+        "inertia J of each axis, 1/b_0", "kg m2", search=(1e-3, 5.0), per_inertia=True
+    )
+    omega_c: Array = per_axis(
+        "bandwidth of the controller: K_P = omega_c^2", "rad/s", search=(1e-2, 300.0)
+    )
+    omega_o: Array = per_axis(
+        "observer: its poles are at 1/(1 + omega_o T), T: tick", "rad/s", search=(1.0, 2e4)
+    )
 
 
 class Memory(LawMemory):

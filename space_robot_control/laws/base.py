@@ -35,17 +35,14 @@ from space_robot_msgs_py.config.validation import short
 from space_robot_msgs_py.errors import SpaceRobotError
 from space_robot_msgs_py.samples import LawInForce, Reference
 
+from .gains import AxisField, GainRange, LawGains, per_axis
+
 Array = NDArray[np.float64]
 
 NO_ESTIMATE, CONSTANT_INERTIA, NOMINAL_INERTIA = range(3)
 """Inertia of a law's time-delay estimate, see `ControlLaw.estimate`."""
 _BLOCKS = ("gains_block", "memory_block")
 """Attributes of a law that hold its memory."""
-
-
-def per_axis(description: str, unit: str = "") -> Any:
-    """Declare a gain, or a field of a law's memory, with one value per axis: (m,)."""
-    return shaped(lambda n: (n + 3,), ", ".join(filter(None, (description, unit))))
 
 
 class SignalsView(RecordView):
@@ -121,10 +118,6 @@ class Signals(Record):
         raise NotImplementedError("signals in kernels have no robot")
 
 
-class LawGains(Record):
-    """Base class of a law's gains, each `per_axis`; users write ``lambda`` for ``lambda_``."""
-
-
 class LawMemory(Record):
     """Last outputs of a law; base class of its internal states."""
 
@@ -158,7 +151,7 @@ class ControlLaw(RecordOwner, ABC):
         """Set the gains; the memory is zero.
 
         Args:
-            gains: an (m,) array for each of ``gains_type``.
+            gains: an (m,) array for each of ``gains_type``, but optional ones.
             period: of the controller, s.
             axes: m; needed only for a law without gains.
         """
@@ -167,6 +160,7 @@ class ControlLaw(RecordOwner, ABC):
         self.gains_block = self.gains_type.block(n)
         self.memory_block = self.memory_type.block(n)
         self._look_into_blocks()
+        self._given = self.optional_gains() & gains.keys()
         self.gain_values = gains
         self.reset()
 
@@ -197,6 +191,23 @@ class ControlLaw(RecordOwner, ABC):
         fields = cls.gains_type.fields().items()
         return {name.rstrip("_"): f.description for name, f in fields if isinstance(f, Field)}
 
+    @classmethod
+    def gain_ranges(cls) -> dict[str, GainRange]:
+        """Return where to search for each gain, by its name for the user, as far as declared."""
+        fields = cls.gains_type.fields().items()
+        return {n.rstrip("_"): f.range for n, f in fields if isinstance(f, AxisField) and f.range}
+
+    @classmethod
+    def optional_gains(cls) -> set[str]:
+        """Return the names of the gains that are zero unless they are given."""
+        fields = cls.gains_type.fields().items()
+        return {n.rstrip("_") for n, f in fields if isinstance(f, AxisField) and f.is_optional}
+
+    @classmethod
+    def required_gains(cls) -> set[str]:
+        """Return the names of the gains that a gain set must have."""
+        return cls.gain_descriptions().keys() - cls.optional_gains()
+
     @property
     def gain_values(self) -> dict[str, Array]:
         """(m,) array of each gain by its name for the user."""
@@ -204,12 +215,23 @@ class ControlLaw(RecordOwner, ABC):
 
     @gain_values.setter
     def gain_values(self, values: Mapping[str, Array]) -> None:
+        optional = self.optional_gains()
         for name, gain in self.gain_values.items():
-            gain[:] = values[name]
+            gain[:] = values.get(name, 0.0) if name in optional else values[name]
+        self._given |= {name for name in optional - self._given if self.gain_values[name].any()}
+
+    @property
+    def given_gains(self) -> dict[str, Array]:
+        """The `gain_values` as they are printed and recorded.
+
+        Without optional gains that were never given, nor other than zero.
+        """
+        left_out = self.optional_gains() - self._given
+        return {name: gain for name, gain in self.gain_values.items() if name not in left_out}
 
     def in_force(self, tick: int, is_first: bool = False) -> LawInForce:
         """Return the law with its present gains as recorded: in force from ``tick`` on."""
-        gains = {name: tuple(values.tolist()) for name, values in self.gain_values.items()}
+        gains = {name: tuple(values.tolist()) for name, values in self.given_gains.items()}
         return LawInForce(tick, self.name, gains, is_first)
 
     @property

@@ -18,16 +18,21 @@ import numpy as np
 from space_robot_msgs_py.compiled.kernels import kernel
 from space_robot_msgs_py.compiled.lanes import where
 
-from .base import Array, CompiledLaw, LawGains, LawMemory, Signals, per_axis
+from .base import Array, CompiledLaw, LawMemory, Signals
+from .gains import LawGains, per_axis
 
 
 class Gains(LawGains):
     """Gains of (31), inertia and g of the observer."""
 
-    inertia: Array = per_axis("nominal inertia J of each axis", "kg m2")
-    bandwidth: Array = per_axis("g of the observer: its pole is at 1/(1 + g T), T: tick", "rad/s")
-    k_p: Array = per_axis("K_P of (31)", "1/s2")
-    k_d: Array = per_axis("K_D of (31)", "1/s")
+    inertia: Array = per_axis(
+        "nominal inertia J of each axis", "kg m2", search=(1e-3, 2.0), per_inertia=True
+    )
+    bandwidth: Array = per_axis(
+        "g of the observer: its pole is at 1/(1 + g T), T: tick", "rad/s", search=(1.0, 2e4)
+    )
+    k_p: Array = per_axis("K_P of (31)", "1/s2", search=(1e-3, 1e5))
+    k_d: Array = per_axis("K_D of (31)", "1/s", search=(1e-2, 1e3))
 
 
 class Memory(LawMemory):

@@ -10,14 +10,15 @@ from __future__ import annotations
 from space_robot_model.dynamics.rho_space import force_for
 from space_robot_msgs_py.compiled.kernels import kernel
 
-from .base import Array, CompiledLaw, LawGains, LawMemory, Signals, per_axis
+from .base import Array, CompiledLaw, LawMemory, Signals
+from .gains import LawGains, per_axis
 
 
 class Gains(LawGains):
     """Gains of (31)."""
 
-    k_p: Array = per_axis("K_P of (31)", "1/s2")
-    k_d: Array = per_axis("K_D of (31)", "1/s")
+    k_p: Array = per_axis("K_P of (31)", "1/s2", search=(1e-3, 1e5))
+    k_d: Array = per_axis("K_D of (31)", "1/s", search=(1e-2, 1e3))
 
 
 @kernel

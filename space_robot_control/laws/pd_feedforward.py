@@ -13,18 +13,26 @@ from space_robot_model.elementary.linear_algebra import cholesky_into, solve_cho
 from space_robot_msgs_py.compiled.kernels import kernel
 from space_robot_msgs_py.compiled.records import shaped
 
-from .base import Array, CompiledLaw, LawGains, LawMemory, Signals, per_axis
+from .base import Array, CompiledLaw, Signals
+from .friction import IntegralMemory, add_error, add_friction, friction_gains, integral_gain, plus
+from .gains import LawGains, per_axis
 
 
 class Gains(LawGains):
     """Stiffness and damping of each axis."""
 
-    k_p: Array = per_axis("stiffness K_P", "N m/rad (eps: N m)")
-    k_d: Array = per_axis("damping K_D", "N m s/rad (eps: N m s)")
+    k_p: Array = per_axis(
+        "stiffness K_P", "N m/rad (eps: N m)", search=(1e-2, 1e5), per_inertia=True
+    )
+    k_d: Array = per_axis(
+        "damping K_D", "N m s/rad (eps: N m s)", search=(0.1, 1e3), per_inertia=True
+    )
+    k_i = integral_gain("N m/(rad s) (eps: N m/s)", 1e6, per_inertia=True)
+    viscous, coulomb, dead_band = friction_gains()
 
 
-class Memory(LawMemory):
-    """Scratch of the forward dynamics of the joints."""
+class Memory(IntegralMemory):
+    """The integral, and scratch of the forward dynamics of the joints."""
 
     factor: Array = shaped(lambda n: (n, n), "Cholesky factor of H_qq")
 
@@ -36,9 +44,11 @@ def feedforward(signals: Signals, gains: Gains, memory: Memory, period: float) -
     H_S and c_S have blocks b (base) and q (joints).
     """
     inertia, bias = signals.nominal.inertia, signals.nominal.bias
-    u, force, axes = memory.u, memory.force, signals.error.size
+    e, u, force, axes = signals.error, memory.u, memory.force, signals.error.size
+    add_error(e, gains.k_i, signals.applied_force, force, memory.integral, period)
     for i in range(axes):
-        force[i] = gains.k_p[i] * signals.error[i] + gains.k_d[i] * signals.error_rate[i]
+        force[i] = gains.k_p[i] * e[i] + gains.k_d[i] * signals.error_rate[i]
+        force[i] = plus(force[i], memory.integral[i])
     # u_b = rhodd_d,b
     for k in range(3):
         u[k] = signals.acceleration_desired[k]
@@ -54,12 +64,17 @@ def feedforward(signals: Signals, gains: Gains, memory: Memory, period: float) -
         force[k] += bias[k]
         for j in range(axes):
             force[k] += inertia[k, j] * u[j]
+    # what friction takes accelerates nothing
+    rates = signals.reference.joint_velocities
+    add_friction(gains.viscous, gains.coulomb, gains.dead_band, rates, force)
 
 
 class ProportionalDerivativeFeedforward(CompiledLaw):
     """``F_q = K_P e + K_D edot``; the base has, beside the same, its part of ``H_S u + c_S``.
 
-    u is the acceleration that F_q causes while the base follows its reference.
+    u is the acceleration that F_q causes while the base follows its reference. With the gains of
+    `friction` there is ``K_I (integral of e)`` beside K_P e; the friction of the desired motion is
+    added to F_q, and causes no acceleration.
     """
 
     name = "pd_feedforward"

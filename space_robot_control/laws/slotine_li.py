@@ -30,7 +30,9 @@ from space_robot_msgs_py.compiled.kernels import kernel, subroutine
 from space_robot_msgs_py.compiled.lanes import any_lane, uniform, where
 from space_robot_msgs_py.compiled.records import nested, shaped
 
-from .base import Array, CompiledLaw, LawGains, LawMemory, Signals, per_axis
+from .base import Array, CompiledLaw, Signals
+from .friction import IntegralMemory, add_error, add_friction, friction_gains, integral_gain, plus
+from .gains import LawGains, per_axis
 
 SLOWEST_ADAPTATION = 1e-30
 """Smallest rate in 1/J that counts as such; 0 in ``gamma`` stands for it, and nothing adapts."""
@@ -41,10 +43,14 @@ LARGEST_SPREAD = 0.99
 class Gains(LawGains):
     """Gains of the law; a body has those of its joint's axis, the base those of its first axis."""
 
-    lambda_: Array = per_axis("slope of the sliding surface", "1/s")
-    k_d: Array = per_axis("gain K_D of s", "N m s")
-    gamma: Array = per_axis("rate of adaptation", "1/J")
-    spread: Array = per_axis("largest relative deviation of a body's mass and inertia")
+    lambda_: Array = per_axis("slope of the sliding surface", "1/s", search=(0.1, 300.0))
+    k_d: Array = per_axis("gain K_D of s", "N m s", search=(1e-2, 300.0), per_inertia=True)
+    gamma: Array = per_axis("rate of adaptation", "1/J", search=(1e-2, 1e6))
+    spread: Array = per_axis(
+        "largest relative deviation of a body's mass and inertia", search=(0.0, 0.5), scale="linear"
+    )
+    k_i = integral_gain("1/s2", 1e4)
+    viscous, coulomb, dead_band = friction_gains()
 
 
 def _second_moments(description: str) -> Array:
@@ -59,8 +65,8 @@ def _vectors(description: str) -> Array:
     return vectors
 
 
-class Memory(LawMemory):
-    """The estimate, what bounds it, and scratch."""
+class Memory(IntegralMemory):
+    """The integral, the estimate, what bounds it, and scratch."""
 
     v: Array = per_axis("reference velocity rhodot_d + lambda e", "rad/s (eps: 1/s)")
     base_rate: Array = shaped(lambda n: (3,), "v0 of a base that nothing turns, rad/s")
@@ -95,11 +101,13 @@ def slotine_li(signals: Signals, gains: Gains, memory: Memory, period: float) ->
         is_new = is_new | (memory.spread[i] != gains.spread[i])
     if any_lane(is_new):
         bound_estimate(signals.model, gains, memory)
+    add_error(e, gains.k_i, signals.applied_force, force, memory.integral, period)
     for i in range(e.size):
-        # v = rhodot_d + lambda e is s + rhodot; u is vdot
-        s[i] = edot[i] + gains.lambda_[i] * e[i]
+        # v = rhodot_d + lambda e is s + rhodot; u is vdot; both with the integral
+        s[i] = plus(edot[i] + gains.lambda_[i] * e[i], memory.integral[i])
         v[i] = s[i] + rate[i]
         u[i] = signals.acceleration_desired[i] + gains.lambda_[i] * edot[i]
+        u[i] = plus(u[i], gains.k_i[i] * e[i])
     # F_S = Y pi + K_D s
     near, desired = signals.attitude_error, signals.reference
     vectors_into(signals.model, near, signals.joint_positions, work)
@@ -113,6 +121,7 @@ def slotine_li(signals: Signals, gains: Gains, memory: Memory, period: float) ->
         let_base_float(signals, gains, memory, is_first, period)
     for i in range(3, e.size):
         force[i] += gains.k_d[i] * s[i]
+    add_friction(gains.viscous, gains.coulomb, gains.dead_band, desired.joint_velocities, force)
     adapt(memory, period)
 
 
@@ -268,6 +277,9 @@ class SlotineLi(CompiledLaw):
     ``s^T H_S s / 2 + |pi - pi*|^2 / 2``, in the norm of ``Gamma^-1``, falls by ``s^T K_D s``
     (Slotine & Li, Int. J. Robotics Research 6(3), 1987). The estimate starts at the nominal
     robot whenever the law takes over.
+
+    With the gains of `friction` s and v have ``K_I (integral of e)`` as well, which leaves the
+    proof as it is, and F_S the friction of the desired motion of the joints.
     """
 
     name = "slotine_li"

@@ -6,15 +6,18 @@ import numpy as np
 
 from space_robot_msgs_py.compiled.kernels import kernel
 
-from .base import Array, CompiledLaw, LawGains, LawMemory, Signals, per_axis
+from .base import Array, CompiledLaw, LawMemory, Signals
+from .gains import LawGains, per_axis
 
 
 class Gains(LawGains):
     """Gains of (33), (38), (59)."""
 
-    h_bar: Array = per_axis("constant inertia h_bar of (33)", "kg m2")
-    lambda_: Array = per_axis("slope of the sliding surface (38)", "1/s")
-    g: Array = per_axis("switching gain of (59)", "N m")
+    h_bar: Array = per_axis(
+        "constant inertia h_bar of (33)", "kg m2", search=(1e-3, 2.0), per_inertia=True
+    )
+    lambda_: Array = per_axis("slope of the sliding surface (38)", "1/s", search=(0.1, 300.0))
+    g: Array = per_axis("switching gain of (59)", "N m", search=(1e-6, 10.0), per_inertia=True)
 
 
 @kernel

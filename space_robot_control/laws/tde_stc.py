@@ -6,16 +6,19 @@ import numpy as np
 
 from space_robot_msgs_py.compiled.kernels import kernel
 
-from .base import Array, CompiledLaw, LawGains, LawMemory, Signals, per_axis
+from .base import Array, CompiledLaw, LawMemory, Signals
+from .gains import LawGains, per_axis
 
 
 class Gains(LawGains):
     """Gains of (33), (38), (40)."""
 
-    h_bar: Array = per_axis("constant inertia h_bar of (33)", "kg m2")
-    lambda_: Array = per_axis("slope of the sliding surface (38)", "1/s")
-    k_1: Array = per_axis("K_1 of (40)", "s^-3/2")
-    k_2: Array = per_axis("K_2 of (40)", "1/s3")
+    h_bar: Array = per_axis(
+        "constant inertia h_bar of (33)", "kg m2", search=(1e-3, 2.0), per_inertia=True
+    )
+    lambda_: Array = per_axis("slope of the sliding surface (38)", "1/s", search=(0.1, 300.0))
+    k_1: Array = per_axis("K_1 of (40)", "s^-3/2", search=(1e-4, 10.0))
+    k_2: Array = per_axis("K_2 of (40)", "1/s3", search=(1e-8, 10.0))
 
 
 class Memory(LawMemory):

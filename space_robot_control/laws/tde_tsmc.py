@@ -7,16 +7,19 @@ import numpy as np
 from space_robot_msgs_py.compiled.kernels import kernel
 from space_robot_msgs_py.compiled.lanes import where
 
-from .base import Array, CompiledLaw, LawGains, LawMemory, Signals, per_axis
+from .base import Array, CompiledLaw, LawMemory, Signals
+from .gains import LawGains, per_axis
 
 
 class Gains(LawGains):
     """Gains of (31), (33), (60)."""
 
-    h_bar: Array = per_axis("constant inertia h_bar of (33)", "kg m2")
-    k_p: Array = per_axis("K_P of (31)", "1/s2")
-    k_d: Array = per_axis("K_D of (31)", "1/s")
-    k_1: Array = per_axis("reaching gain K_1 of (60)", "s^-3/2")
+    h_bar: Array = per_axis(
+        "constant inertia h_bar of (33)", "kg m2", search=(1e-3, 2.0), per_inertia=True
+    )
+    k_p: Array = per_axis("K_P of (31)", "1/s2", search=(1e-3, 1e5))
+    k_d: Array = per_axis("K_D of (31)", "1/s", search=(1e-2, 1e3))
+    k_1: Array = per_axis("reaching gain K_1 of (60)", "s^-3/2", search=(1e-4, 10.0))
 
 
 class Memory(LawMemory):

@@ -21,7 +21,7 @@ from space_robot_control.controller.settings import (
 )
 from space_robot_control.controller.supervisor import Supervisor
 from space_robot_control.flight_code.supervisors import supervisor_of
-from space_robot_control.laws import ControlLaw, find_law
+from space_robot_control.laws import ControlLaw, find_law, laws
 from space_robot_control.laws.names import is_plain, require_shipped_file, require_shipped_law
 from space_robot_model.robot.find import ROBOT_STEM, find_robot
 from space_robot_msgs_py.config.files import Tree, flatten
@@ -113,7 +113,7 @@ class ControllerChoice:
         """Laws swapped to in flight."""
         now = self._resolve()
         self.is_as_flown = is_same_law and (
-            not gains or gains == flown.get("gains") or _same(now.gain_values, recorded_gains)
+            not gains or gains == flown.get("gains") or _same(now.given_gains, recorded_gains)
         )
         """True if law and gains are those that flew; what was ``chosen`` is not looked at."""
         self.follows_flight = is_same_law and "swaps" not in chosen
@@ -181,6 +181,9 @@ class ControllerChoice:
     def _recorded_gains(self, of_laws: Mapping[str, Tree]) -> dict[str, Any]:
         """The recorded gains by law, in place of a gain set that is not on this machine."""
         parameters = dict(flatten(of_laws))
+        for name in of_laws.keys() & laws():  # a set of today may have gains that none had
+            for gain in laws()[name].optional_gains():
+                parameters.setdefault(f"{name}.{gain}", [0.0])
         if of_laws and set(map(_swap_law, self._flown_swaps)) <= set(of_laws):
             parameters["gains"] = self.gains_name if self._has_gain_set() else DEFAULT
         return parameters

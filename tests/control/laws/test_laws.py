@@ -4,23 +4,38 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
+from typing import Any
 
 import numba
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from law_equations import EQUATIONS, PERIOD, History, forces, random_gains
+from law_equations import EQUATIONS, PERIOD, TICKS, History, forces, random_gains
 from numpy.typing import NDArray
 from paths import ROOT
 
 from space_robot.flight.plan import Flight, Scenario, resolve
 from space_robot.flight.simulate import simulate
-from space_robot_control.laws import CompiledLaw, ControlLaw, Signals, find_law, laws
+from space_robot_control.controller.gains import check_gains, read_gains
+from space_robot_control.laws import (
+    CompiledLaw,
+    ControlLaw,
+    GainRange,
+    Signals,
+    find_law,
+    laws,
+    per_axis,
+)
 from space_robot_control.laws.base import CONSTANT_INERTIA, NO_ESTIMATE, NOMINAL_INERTIA
 from space_robot_control.laws.ctc_smc import saturation
+from space_robot_model.robot.find import find_robot
+from space_robot_msgs_py.compiled.records import assign
+from space_robot_msgs_py.errors import InputError
 
 Array = NDArray[np.float64]
+WITH_FRICTION = ("ctc", "ctc_smc", "pd", "pd_feedforward", "slotine_li")
+OPTIONAL = {"k_i", "viscous", "coulomb", "dead_band"}
 
 
 def law_of(name: str, seed: int, axes: int = 9) -> ControlLaw:
@@ -63,7 +78,7 @@ def test_the_memory_is_a_laws_own_is_emptied_and_restored(name: str) -> None:
     np.testing.assert_array_equal(forces(twin, history), first)
     saved = law.save()
     remembered = forces(law, history)
-    has_memory = name in ("tde_tsmc", "tde_stc", "dob", "adrc")
+    has_memory = name in ("tde_tsmc", "tde_stc", "dob", "adrc", *WITH_FRICTION)
     assert np.any(remembered != first) == has_memory, "a memory must show"
     forces(other, history)
     other.restore(saved)
@@ -160,6 +175,99 @@ def test_terminal_surface_starts_at_zero_whatever_the_error() -> None:
         np.testing.assert_array_equal(controller.memory.s, np.zeros(9))
         u_pd = history.rhodd_d[k] + gains["k_d"] * history.edot[k] + gains["k_p"] * history.e[k]
         np.testing.assert_allclose(force, gains["h_bar"] * u_pd + history.n_hat[k], rtol=1e-13)
+
+
+def test_gains_against_friction_are_zero_and_not_told_of_unless_they_are_given() -> None:
+    """Given as zero they are, as after a change in flight; and a missing one of others is none."""
+    for name, law in laws().items():
+        assert law.optional_gains() == (OPTIONAL if name in WITH_FRICTION else set())
+    ctc, required = find_law("ctc"), {"k_p": [4.0], "k_d": [2.0]}
+    gains = check_gains(required, ctc, 9, "here")
+    law = ctc(gains, PERIOD)
+    assert set(law.gain_values) == {*required, *OPTIONAL}
+    assert not any(law.gain_values[name].any() for name in OPTIONAL)
+    assert set(law.given_gains) == set(law.in_force(0).gains) == set(required)
+    law.gain_values = {**law.gain_values, "coulomb": np.ones(9)}
+    assert set(law.in_force(1).gains) == {*required, "coulomb"}
+    law.gain_values = gains
+    assert law.in_force(2).gains["coulomb"] == (0.0,) * 9
+    given = ctc(check_gains({**required, "k_i": [0.0]}, ctc, 9, "here"), PERIOD)
+    assert list(given.given_gains) == ["k_p", "k_d", "k_i"]
+    with pytest.raises(InputError, match=r"ctc.k_d: missing"):
+        check_gains({"k_p": [1.0]}, ctc, 9, "here")
+    with pytest.raises(InputError, match="unknown gain of ctc 'k_j' in here: choose one of k_p,"):
+        check_gains({**required, "k_j": [1.0]}, ctc, 9, "here")
+
+
+@pytest.mark.parametrize("name", [name for name in WITH_FRICTION if name in EQUATIONS])
+def test_gains_of_zero_keep_the_bits_of_the_law_without_them(name: str) -> None:
+    """Of zeros with a sign, too: what is added is nothing."""
+    law, history = find_law(name), History(9, 4)
+    for signal in (history.e, history.edot, history.bias, history.rhodd_d):
+        signal[3] = -0.0
+    gains = {**random_gains(law, 9, 1), **dict.fromkeys(OPTIONAL, np.zeros(9))}
+    plain = dict(gains)
+    for gain in OPTIONAL:
+        del plain[gain]
+    built = law(plain, PERIOD)
+    force = forces(built, history)
+    assert force.tobytes() == forces(law(gains, PERIOD), history).tobytes()
+    if name == "pd":
+        expected = gains["k_p"] * history.e + gains["k_d"] * history.edot
+        assert force.tobytes() == expected.tobytes()
+    assert not built.memory.integral.any()
+
+
+@pytest.mark.parametrize("name", WITH_FRICTION)
+def test_an_integral_waits_at_the_limit_and_leaves_it_at_once(name: str) -> None:
+    """With a tenth applied of what was asked; then the error has the other sign."""
+    law = find_law(name)
+    gains = {**random_gains(law, 9, 1), "k_i": np.ones(9)}
+    if name == "slotine_li":
+        gains["k_d"] *= 1e4  # what is asked has the sense of the error
+    built, history, sums = law(gains, PERIOD), History(9, 5), []
+    history.edot[:], history.rhodd_d[:], history.bias[:] = 0.0, 0.0, 0.0
+    history.rates_d[:], history.rho_rate[:], history.inertia[:] = 0.0, 0.0, np.eye(9)
+    history.e[:], history.e[-1] = 0.5, -0.5
+    for k in range(TICKS):
+        history.applied[k] = (1.0 if k < 2 else 0.1) * built.memory.force
+        block = history.block(k)
+        signals = Signals.view(block)
+        signals.quaternion[0] = signals.attitude_error[0] = signals.reference.quaternion[0] = 1.0
+        assign(block[0], model=find_robot("paper").model)
+        built.force(signals)
+        sums.append(built.memory.integral.copy())
+    steps = np.diff(sums, axis=0, prepend=np.zeros((1, 9))) / (0.5 * PERIOD)
+    np.testing.assert_allclose(steps[:2], 1.0)
+    assert not steps[2:-1].any()
+    np.testing.assert_allclose(steps[-1], -1.0)
+
+
+def test_each_gain_says_where_to_search_for_it() -> None:
+    """The shipped sets are inside, by the largest and smallest inertia that an axis may have."""
+    for law in laws().values():
+        assert law.gain_ranges().keys() == law.gain_descriptions().keys()
+        for gain, span in law.gain_ranges().items():
+            assert span.is_optional == (gain in OPTIONAL)
+            assert law.gain_descriptions()[gain].endswith(span.unit)
+            for file in (ROOT / "config/gains").glob(f"*/*/{law.name}.yaml"):
+                if span.is_optional or span.per_inertia or file.parent.name == "printed":
+                    continue
+                axes = find_robot(file.parents[1].name).n + 3
+                values = read_gains(file, law, axes)[gain]
+                assert np.all((span.lower <= values) & (values <= span.upper)), (file, gain)
+    ctc = laws()["ctc"].gain_ranges()
+    assert ctc["k_d"] == GainRange(0.1, 1e3, "log", "1/s", per_inertia=False, is_optional=False)
+    assert laws()["pd"].gain_ranges()["k_d"].per_inertia
+    assert laws()["slotine_li"].gain_ranges()["spread"].scale == "linear"
+
+
+@pytest.mark.parametrize(
+    ("search", "scale"), [((1.0, 1.0), "log"), ((0.0, 1.0), "log"), ((0.0, 1.0), "cubic")]
+)
+def test_a_range_that_is_none_is_refused(search: tuple[float, float], scale: Any) -> None:
+    with pytest.raises(ValueError, match=r"K: "):
+        per_axis("K", "1/s", search=search, scale=scale)
 
 
 @given(st.floats(-1e3, 1e3), st.floats(1e-6, 10.0))

@@ -98,7 +98,7 @@ def test_all_that_is_made_of_a_plan_agrees(plan: Planned) -> None:
     built = build_laws(controller, len(robot.nominal.axis_names), gains)
     law = next(iter(built.values()))
     assert said["controller"] == law.name
-    assert said["gains_used"] == {name: row.tolist() for name, row in law.gain_values.items()}
+    assert said["gains_used"] == {name: row.tolist() for name, row in law.given_gains.items()}
     theirs = Plant(find_robot(plant.robot), plant, plant.period)
     assert theirs.block.tobytes() == flight.plant.block.tobytes()
     assert theirs.command_delay_buffer.shape == flight.plant.command_delay_buffer.shape
