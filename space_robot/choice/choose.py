@@ -9,9 +9,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from space_robot_control.laws import find_law, laws
 from space_robot_msgs_py.errors import InputError
+from space_robot_sim.environment.friction import coefficients
 
 from ..analysis.analysed_log import AnalysedLog
 from ..api import Scenario
@@ -30,6 +32,7 @@ from .gain_files import install, write_gains
 from .search_space import GainPoint, SearchSpace
 from .trials import Trials, Uncertainty
 
+Array = NDArray[np.float64]
 Progress = Callable[[str], AbstractContextManager[Callable[[int], Callable[[], None]]]]
 """Shows a step by its description, see `console.progress.counting_progress`."""
 
@@ -150,12 +153,17 @@ def choose(
         InputError: the scenario cannot be flown, or it has no such law.
     """
     names = options.laws or tuple(sorted(laws()))
-    known = {key: scenario[key] for key in TUNED if key in scenario}
-    tuned = tuned_set(known, [str(scenario.get("case", "1"))], INITIAL_TUNING, lambda text: None)
+    of_tuning = {key: scenario[key] for key in TUNED if key in scenario}
+    tuned = tuned_set(
+        of_tuning, [str(scenario.get("case", "1"))], INITIAL_TUNING, lambda text: None
+    )
     write_set(tuned, command, folder / TUNED_SET)
-    search = _Search(dict(scenario), f"{folder}/{TUNED_SET}", tuned_points(tuned), {}, options)
+    points, gains = tuned_points(tuned), f"{folder}/{TUNED_SET}"
+    search = _Search(dict(scenario), gains, points, {}, np.empty((0, 2)), options)
     nominal = Scenario(**search.options_of(names[0])).check()
-    search = replace(search, torques=torques_of(nominal))
+    known = nominal.scenario.robots.controller
+    friction = coefficients(known, nominal.plant_settings.friction)[: known.n]
+    search = replace(search, torques=torques_of(nominal), friction=friction)
     with progress("fronts of the laws") as begin:
         found = run_all(search, names, min(options.workers, len(names)), begin)
     fronts = {front.law: front for front in found}
@@ -224,6 +232,8 @@ class _Search:
     gains: str
     points: dict[str, GainPoint]
     torques: dict[str, float]
+    friction: Array
+    """f_C and f_V (n, 2) of the joints as a user knows them."""
     options: ChoiceOptions
 
     def __call__(self, law: str) -> Front:
@@ -260,4 +270,6 @@ class _Search:
             start = GainPoint(scenario.law.gain_values, corner)
         if start is None:
             raise InputError(f"law {controller}: has no tuned gains: give some, {controller}=GAINS")
-        return SearchSpace(find_law(controller), start, has_base, has_estimate(controller))
+        return SearchSpace(
+            find_law(controller), start, self.friction, has_base, has_estimate(controller)
+        )
