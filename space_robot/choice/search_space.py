@@ -220,6 +220,6 @@ def _of_each_gain(law: type[ControlLaw], gains: Mapping[str, Array]) -> list[Fac
         low, high = 1.0 / OWN_RANGE, OWN_RANGE
         if (declared := law.gain_ranges().get(name)) and not declared.per_inertia:
             middle = float(np.median(values[values > 0.0]))
-            low, high = max(declared.low, 1e-3 * middle) / middle, declared.high / middle
+            low, high = max(declared.lower, 1e-3 * middle) / middle, declared.upper / middle
         factors.append(Factor(name, {name: 1.0}, min(low, 1.0), max(high, 1.0)))
     return factors
