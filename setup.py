@@ -55,6 +55,7 @@ setup(
         "space_robot.analysis": ["templates/*.j2"],
         "space_robot.analysis.figures": ["*.mplstyle"],
         "space_robot.campaign.report": ["templates/*.j2"],
+        "space_robot.choice": ["templates/*.j2"],
         "space_robot.cli": ["templates/*.txt"],
         "space_robot.help": ["*.md"],
         "space_robot.paper": ["templates/*.j2"],
@@ -65,6 +66,7 @@ setup(
     python_requires=">=3.10,<3.14",
     install_requires=[
         "click>=8.1",
+        "cma>=4.0",
         "jinja2>=3.1",
         "matplotlib>=3.8",
         "mcap>=1.5",

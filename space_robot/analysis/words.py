@@ -69,7 +69,7 @@ def remarks(report: Report) -> list[str]:
         *_drift(metrics),
         *_pointing(report["pointing"], metrics),
         *_saturated_wheels(metrics),
-        *_limit_cycles(metrics),
+        *limit_cycles(metrics),
         *_standing_joints(metrics),
         *_beyond_limits(metrics),
         *filter(None, (report["unfinished"], *report["damage"])),
@@ -126,7 +126,8 @@ def _saturated_wheels(metrics: Metrics) -> Iterator[str]:
         )
 
 
-def _limit_cycles(metrics: Metrics) -> Iterator[str]:
+def limit_cycles(metrics: Metrics) -> Iterator[str]:
+    """Say which torques oscillate at one frequency, by more than a share of what they do."""
     cycles = [
         f"{name} at {metrics[f'{name}.ripple_peak_hz']:.3g} Hz with {peak:.2g} "
         f"{column_unit(name)} RMS"

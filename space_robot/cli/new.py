@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import shlex
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -161,6 +162,13 @@ def new() -> None:
     help="Roll, pitch, yaw of the arm's root on the satellite, degrees [default: 0,0,0].",
 )
 @click.option("--force", is_flag=True, help="Replace an older folder of this command.")
+@click.option(
+    "--evaluations",
+    type=click.IntRange(1, 100_000),
+    default=40,
+    show_default=True,
+    help="Gain sets to try for each law; 1: the tuned one alone.",
+)
 @flight_options("json")
 def new_robot(
     robot: str,
@@ -174,15 +182,17 @@ def new_robot(
     at: list[float] | None,
     rpy_deg: list[float] | None,
     force: bool,
+    evaluations: int,
     as_json: bool,
 ) -> None:
-    """Make a folder for a robot: model, mission, gains for all laws; fly each law once.
+    """Make a folder for a robot: model, mission, the law that flies it best, and its gains.
 
     ROBOT is a URDF, a xacro (where xacro is installed), or a YAML file. The mission goes from rest
-    to rest within the limits of the joints, the gains are those of `gains tune --h-bar auto`. The
-    law with the least errors and ripple with friction and sensors becomes the robot's default. Exit
-    code 1 if a law could not fly with its gains; the folder is made nevertheless. The word
-    ``robot`` may be left out.
+    to rest within the limits of the joints, slow enough for usual wheels. For each law some gains
+    are tried in flights with friction and sensors, from those of `gains tune` on; the law with the
+    least errors becomes the robot's default. `space-robot choose` does the same for your own
+    hardware and mission, and looks longer. Exit code 1 if no law flies; the folder is made
+    nevertheless. The word ``robot`` may be left out.
 
     \b
     Examples:
@@ -196,12 +206,14 @@ def new_robot(
     from space_robot_model.robot.find import robot_as_path, robot_files
     from space_robot_msgs_py.errors import SpaceRobotError
 
-    from ..campaign.new_robot import check_replaceable, make_robot, robot_texts
-    from ..campaign.new_robot.display import rms_table
-    from ..campaign.new_robot.texts import CAMPAIGN_FILE
+    from ..choice.new_robot import SHORT, check_replaceable, make_robot
+    from ..choice.report import candidates_table
+    from ..choice.robot_files import CAMPAIGN_FILE, robot_texts
+    from ..console.progress import counting_progress
     from ..console.terminal import echo_json, terminal
     from ..console.terminal_tables import print_table
-    from ..flight.compilation import compile_kernels
+    from ..flight.batch.compilation import compile_lanes
+    from ..processes.executor import cores
 
     if base_inertia:
         base_inertia = [*base_inertia, 0.0, 0.0, 0.0][:6]
@@ -221,9 +233,9 @@ def new_robot(
         click.echo(f"repaired: {line}", err=True)
     folder = out or Path(files.name)
     check_replaceable(folder, force, texts)
-    compile_kernels()
-    with terminal(stderr=True).status("reading") as status:
-        made = make_robot(texts, read, folder, command, status.update)
+    compile_lanes()
+    options = replace(SHORT, evaluations=evaluations, workers=cores())
+    made = make_robot(texts, read, folder, command, counting_progress, options)
     click.echo(
         f"made {folder}/: `space-robot fly --robot {folder}/` flies it, "
         f"`space-robot campaign run {folder}/{CAMPAIGN_FILE}` with dispersed masses",
@@ -232,11 +244,9 @@ def new_robot(
     if as_json:
         echo_json(made.report())
     else:
-        print_table(rms_table(made), terminal())
-    if failed := [law for law, flown in made.flights.items() if flown.failure]:
-        raise SpaceRobotError(
-            f"{', '.join(failed)}: {made.flights[failed[0]].failure}: the gains are of {folder}"
-        )
+        print_table(candidates_table(made.choice, made.remarks), terminal())
+    if not made.choice.law:
+        raise SpaceRobotError(f"no law flies {folder}/: see the table")
 
 
 for command in (new_files.law, new_files.sensor, new_files.metric, new_files.mission):

@@ -37,7 +37,12 @@ def say(console: Console, text: str) -> None:
 
 def echo_json(report: Any) -> None:
     """Print a report as JSON; NaN and infinity become null."""
-    click.echo(json.dumps(_finite(report), indent=2, allow_nan=False))
+    click.echo(json_text(report))
+
+
+def json_text(report: Any) -> str:
+    """Return a report as JSON; NaN and infinity become null."""
+    return json.dumps(_finite(report), indent=2, allow_nan=False)
 
 
 def _finite(value: Any) -> Any:

@@ -42,17 +42,11 @@ def gain_files(tuned: Tuned, command: str) -> Mapping[str, str]:
     """
     head = [f"Made by `{command}`."]
     files = {
-        f"{name}.yaml": _file([*head, NOTES[name], *_numbers(tuned, law)], name, law.gains)
+        f"{name}.yaml": gain_text([*head, NOTES[name], *_numbers(tuned, law)], name, law.gains)
         for name, law in tuned.laws.items()
     }
-    files[OF_THE_SET] = "\n".join(
-        [
-            *_comments([*head, "Low-pass of the time-delay estimate, part of the set's margin."]),
-            "controller_node:",
-            "  ros__parameters:",
-            f"    acceleration_filter_hz: {tuned.corner_hz:g}",
-            "",
-        ]
+    files[OF_THE_SET] = set_text(
+        [*head, "Low-pass of the time-delay estimate, part of the set's margin."], tuned.corner_hz
     )
     return files
 
@@ -108,7 +102,21 @@ def _numbers(tuned: Tuned, law: TunedLaw) -> Sequence[str]:
     return [*lines, *law.remarks]
 
 
-def _file(comments: Sequence[str], law: str, gains: Mapping[str, Array]) -> str:
+def set_text(comments: Sequence[str], corner_hz: float) -> str:
+    """Return the text of a set's `OF_THE_SET`; ``corner_hz`` of the estimate's low-pass."""
+    return "\n".join(
+        [
+            *_comments(comments),
+            "controller_node:",
+            "  ros__parameters:",
+            f"    acceleration_filter_hz: {corner_hz:g}",
+            "",
+        ]
+    )
+
+
+def gain_text(comments: Sequence[str], law: str, gains: Mapping[str, Array]) -> str:
+    """Return the text of a law's gain file; ``gains`` (m,) by name."""
     lines = [*_comments(comments), "controller_node:", "  ros__parameters:", f"    {law}:"]
     for name, values in gains.items():
         if name == "h_bar" and not values.any():

@@ -1,4 +1,7 @@
-"""Shapes and plates of a robot: those of its file, or derived from kinematics and masses."""
+"""Shapes and plates of a robot: those of its file, or derived from kinematics and masses.
+
+Plates are pushed by air and light, so they have the same bits on every processor: no BLAS here.
+"""
 
 from __future__ import annotations
 
@@ -7,7 +10,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..elementary.matrices import Array, product
+from ..elementary.linear_algebra import principal_axes
+from ..elementary.matrices import Array, norm, product
 from .parts import Colour, Plate, Visual, moved
 
 if TYPE_CHECKING:
@@ -36,7 +40,7 @@ def shapes_of(robot: Robot) -> tuple[Visual, ...]:
 def drawn_shapes(robot: Robot) -> Iterator[Visual]:
     """Yield the derived shapes of `shapes_of`, also for a robot with visuals."""
     ends = _ends(robot)
-    lengths = sum(float(np.linalg.norm(end)) for body in ends[1:] for end in body)
+    lengths = sum(norm(end) for body in ends[1:] for end in body)
     radius = max(THINNEST, SLENDER * lengths)
     for body, own in enumerate(ends):
         is_base, is_panel = body == 0, body > robot.n
@@ -58,7 +62,7 @@ def drawn_shapes(robot: Robot) -> Iterator[Visual]:
         for end in own if not is_panel else ():
             if is_base:  # from the surface of the box
                 half = 0.5 * np.array(box.size)
-                start = box.rotation @ np.clip(box.rotation.T @ end, -half, half)
+                start = product(box.rotation, np.clip(product(box.rotation.T, end), -half, half))
             yield from _tube(start, end, radius, body)
 
 
@@ -74,10 +78,10 @@ def even_box(mass: float, inertia: Array, com: Array, body: int, colour: Colour)
     """
     # second moments of an even box: m / 12 times its edges squared
     second = 0.5 * np.trace(inertia) * np.eye(3) - inertia
-    moments, axes = np.linalg.eigh(second)
+    moments, axes = principal_axes(second)
     edges = np.sqrt(12.0 * np.maximum(moments, 0.0) / mass)
     # eigenvectors may be a left-handed frame
-    if np.linalg.det(axes) < 0.0:
+    if product(np.cross(axes[:, 0], axes[:, 1]), axes[:, 2]) < 0.0:
         axes[:, 0] *= -1.0
     size = tuple(np.maximum(edges, THINNEST).tolist())
     return Visual("box", size, axes, com, colour=colour, body=body)
@@ -96,7 +100,7 @@ def _ends(robot: Robot) -> list[list[Array]]:
     ends: list[list[Array]] = [[] for _ in robot.body_names]
     for joint in robot.order:
         turn = robot.rotation[joint]
-        ends[robot.parent[joint]].append(turn @ robot.offset[joint])
+        ends[robot.parent[joint]].append(product(turn, robot.offset[joint]))
     for tool in robot.tools:
         ends[tool.body].append(tool.position)
     return ends
@@ -104,7 +108,7 @@ def _ends(robot: Robot) -> list[list[Array]]:
 
 def _tube(start: Array, end: Array, radius: float, body: int) -> Iterator[Visual]:
     along = end - start
-    length = float(np.linalg.norm(along))
+    length = norm(along)
     if length < THINNEST:
         return
     yield Visual(
@@ -119,7 +123,7 @@ def _tube(start: Array, end: Array, radius: float, body: int) -> Iterator[Visual
 
 def _turn_to(z: Array) -> Array:
     x = np.cross(np.eye(3)[np.argmin(np.abs(z))], z)
-    x /= np.linalg.norm(x)
+    x /= norm(x)
     return np.column_stack((x, np.cross(z, x), z))
 
 

@@ -9,7 +9,7 @@ import shutil
 import stat
 import sys
 import tempfile
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from functools import cache
 from pathlib import Path
 from types import CodeType
@@ -18,6 +18,7 @@ from typing import Any
 ROOM_BYTES = 16 << 20
 """Required free space for a complete cache, with reserve."""
 _NAME = re.compile(rb"\b[A-Z][A-Z0-9_]+\b")
+_IMPORT = re.compile(rb"^from (\.*)([\w.]*) import (\([^)]*\)|.*)$", re.MULTILINE)
 _CONSTANT = re.compile(rb"\n([A-Z][A-Z0-9_, ]+) = (.*)")
 
 
@@ -30,19 +31,16 @@ def cache_directory() -> Path:
     here = Path(__file__).resolve()
     root = here.parents[2]
     digest = hashlib.sha256(str(root).encode())  # one cache per installation, as in Numba
-    others: list[bytes] = []
-    names: set[bytes] = set()
-    for source in sorted(root.glob("space_robot*/**/*.py")):
-        text = source.read_bytes()
-        if b"@kernel" in text or b"@subroutine" in text or source.parent == here.parent:
-            digest.update(text)
-            names.update(_NAME.findall(text.partition(b"\n\n\n")[0]))  # in its imports
-        else:
-            others.append(text)
-    for text in others:  # the numbers of other files that kernels use are compiled into them
-        for constants, values in _CONSTANT.findall(text):
-            if not names.isdisjoint(_NAME.findall(constants)):
-                digest.update(constants + values)
+    texts = {source: source.read_bytes() for source in sorted(root.glob("space_robot*/**/*.py"))}
+    kernels = [
+        source
+        for source, text in texts.items()
+        if b"@kernel" in text or b"@subroutine" in text or source.parent == here.parent
+    ]
+    for source in kernels:
+        digest.update(texts[source])
+    for constant in _imported_constants(kernels, texts, root):  # they are compiled into kernels
+        digest.update(constant)
     home = os.environ.get("XDG_CACHE_HOME") or str(Path.home() / ".cache")
     base = os.environ.get("NUMBA_CACHE_DIR") or str(Path(home) / "space_robot")
     wanted, name = Path(base), digest.hexdigest()[:16]
@@ -54,6 +52,45 @@ def cache_directory() -> Path:
     )
     os.environ["NUMBA_CACHE_DIR"] = str(other)  # for child processes
     return other / name
+
+
+def _imported_constants(
+    kernels: Iterable[Path], texts: Mapping[Path, bytes], root: Path
+) -> list[bytes]:
+    """Return the definitions of the constants that modules import, and of those in them."""
+    found: set[bytes] = set()
+    waiting = [(source, frozenset[bytes]()) for source in kernels]
+    seen = set(waiting)
+    while waiting:
+        source, asked = waiting.pop()
+        names = set(asked)
+        for constants, values in _CONSTANT.findall(texts[source]):
+            if not asked.isdisjoint(_NAME.findall(constants)):
+                found.add(constants + values)
+                names.update(_NAME.findall(values))
+        needed = [(source, frozenset(names))] if asked else []
+        needed += [
+            (module, frozenset(imported & names if asked else imported))
+            for module, imported in _imports(source, texts, root)
+        ]
+        new = [each for each in needed if each[1] and each not in seen]
+        seen.update(new)
+        waiting += new
+    return sorted(found)
+
+
+def _imports(
+    source: Path, texts: Mapping[Path, bytes], root: Path
+) -> Iterator[tuple[Path, set[bytes]]]:
+    """Yield the modules from which a module imports constants, and the names of these."""
+    for dots, name, imported in _IMPORT.findall(texts[source].partition(b"\n\n\n")[0]):
+        if names := set(_NAME.findall(imported)):
+            start = source.parents[len(dots) - 1] if dots else root
+            place = start.joinpath(*filter(None, name.decode().split(".")))
+            if (module := place.with_suffix(".py")) in texts:
+                yield module, names
+            else:  # a package's names are of any of its modules
+                yield from ((inner, names) for inner in texts if inner.parent == place)
 
 
 def _unusable(folder: Path) -> str:

@@ -27,31 +27,6 @@ OF_URDF = """\
 """
 
 CAMPAIGN_FILE = "campaign.yaml"
-CAMPAIGN = """\
-# Made by `{command}`. `space-robot campaign run {folder}/{file}` flies it.
-# The robot's masses, inertias and start are off a little, with payload and disturbances of case 3:
-# does the base point within 1e-3 (error of the quaternion's vector part) in 90 % of such flights?
-# More: docs/manual/campaigns.md.
-scenario: {{robot: {folder}/, case: "3"}}   # the path begins where the command runs
-laws: [tde_stc, ctc]
-vary:
-  robot.links[*].mass: {{normal: 1.0, sigma: 0.05, relative: true}}
-  robot.base.inertia: {{scale: 0.1, rotate_deg: 3.0}}
-  mission.start_deg: {{uniform: [-0.1, 0.1], offset: true}}
-require:
-  pointing: {{metric: attitude.max, below: 1.0e-3, in: 0.9, confidence: 0.9}}
-runs: 40
-"""
-
-
-def campaign_text(folder: Path, command: str) -> str:
-    """Return the text of a first campaign with the robot.
-
-    Args:
-        folder: of the robot.
-        command: the user's command, for the header.
-    """
-    return CAMPAIGN.format(command=command, folder=folder, file=CAMPAIGN_FILE)
 
 
 def robot_texts(

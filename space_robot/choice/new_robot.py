@@ -1,19 +1,17 @@
-"""Creates the folder of a new robot, and flies all laws with its mission and gains."""
+"""Creates the folder of a new robot, and chooses the law that it flies."""
 
 from __future__ import annotations
 
 import math
 import shlex
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
-from functools import partial
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from space_robot_control.controller.settings import DEFAULT_SETS, OF_THE_SET, OTHERS
 from space_robot_control.guidance.limits import MissionLimits
 from space_robot_control.guidance.mission import MissionSettings
 from space_robot_control.guidance.segments import read_segments
@@ -23,31 +21,21 @@ from space_robot_model.robot.files import is_urdf, read_content
 from space_robot_model.robot.find import OWN_GAINS, OWN_MISSION
 from space_robot_model.robot.urdf import UrdfRobot
 from space_robot_msgs_py.config.validation import read_yaml
-from space_robot_msgs_py.errors import FlightError, InputError
+from space_robot_msgs_py.errors import InputError
 from space_robot_sim.environment.environment import EnvironmentSettings
 
-from ...analysis import measure
-from ...analysis.measure import column_unit
-from ...analysis.words import of_statistic
-from ...console.files import atomic_folder
-from ...flight.plan import Flight, Scenario, resolve
-from ...flight.simulate import simulate
-from ...processes.executor import cores, run_all
-from ...tuning.gain_file import estimate_remark
-from ...tuning.task import AUTO, TuningOptions, force_demand
-from ..gain_set import tuned_set, write_set
-from .texts import CAMPAIGN_FILE, ROBOT_FILE, campaign_text
+from ..console.files import atomic_folder
+from ..tuning.gain_file import estimate_remark
+from ..tuning.task import force_demand
+from .choose import Choice, ChoiceOptions, Progress, choose
+from .report import campaign_text
+from .robot_files import CAMPAIGN_FILE, ROBOT_FILE
 
-SET, CASE = "tuned", "1"
-"""Name of the tuned gain set, and the environment of tuning and flights."""
 TRIAL: Mapping[str, Any] = {"case": "3", "sensors": "fine", "navigation": "filtered"}
 """Friction and hardware with which the laws are compared."""
 CONDITIONS = "friction, payload and disturbances of case 3, sensors fine and navigation filtered"
-REASON = f"it has the least errors and ripple (geometric mean) with {CONDITIONS}"
-DIVERGED, BEYOND = "diverged", "went beyond the joints' limits of effort"
-WISHES = TuningOptions(margin=0.05, mass_uncertainty=0.2, h_bar=AUTO)
-"""Defaults of ``gains tune``, but that the estimate has the nominal inertia where it must."""
-
+SHORT = ChoiceOptions(evaluations=40, longest_s=8.0, runs=8, weights=(0.3,))
+"""How the law is chosen: shorter than `space-robot choose` does."""
 
 Array = NDArray[np.float64]
 
@@ -59,12 +47,18 @@ TURN, SLIDE = math.radians(30.0), 0.25
 OF_THE_RANGE, OF_THE_LIMITS = 0.25, 0.5
 """Largest displacement as a share of the joint's range; largest velocity and effort as shares of
 their limits."""
+BASE_TORQUE = 0.2 / 300.0
+"""Torque of the base's actuators by the mass of the robot, N m/kg: 0.2 N m of the wheels of a
+satellite of 300 kg; the space station's gyroscopes have 258 N m for 420 t."""
 PEAK_VELOCITY = 1.875
 """Peak velocity of a rest-to-rest quintic, relative to its mean velocity."""
 
 
 def rest_to_rest(robot: Robot) -> MissionSettings:
     """Return a mission for the actuated joints of ``robot``, the base's attitude held.
+
+    Its legs last as long as the joints' limits need, and as the base needs for the torque of
+    usual actuators (`BASE_TORQUE`), at most `LONGEST_LEG_S`.
 
     Raises:
         InputError: the limits would need legs longer than `LONGEST_LEG_S`.
@@ -80,15 +74,17 @@ def rest_to_rest(robot: Robot) -> MissionSettings:
     points = np.array([start, start + signs * way, start - 0.5 * signs * way])
     longest = np.abs(np.diff(points, axis=0)).max(axis=0)
     leg = max(LEG_S, float(np.max(PEAK_VELOCITY * longest / (OF_THE_LIMITS * velocity))))
-    asked = force_demand(nominal, _mission(robot, points, leg), [EnvironmentSettings()]).nominal[3:]
-    leg *= max(1.0, math.sqrt(float(np.max(asked / (OF_THE_LIMITS * effort)))))
+    asked = force_demand(nominal, _mission(robot, points, leg), [EnvironmentSettings()]).nominal
+    leg *= max(1.0, math.sqrt(float(np.max(asked[3:] / (OF_THE_LIMITS * effort)))))
     leg = math.ceil(leg)
     if leg > LONGEST_LEG_S:
         raise InputError(
             f"robot {robot.name!r}: with its limits of velocity and effort the legs of a mission "
             f"would last {leg} s: write a mission by hand"
         )
-    return _mission(robot, points, leg)
+    usual = OF_THE_LIMITS * BASE_TORQUE * float(np.sum(robot.mass))
+    slower = LEG_S * math.sqrt(float(np.max(asked[:3])) / usual)
+    return _mission(robot, points, max(leg, min(math.ceil(slower), LONGEST_LEG_S)))
 
 
 def mission_text(robot: Robot, mission: MissionSettings, command: str) -> str:
@@ -126,33 +122,15 @@ def _mission(robot: Robot, points: Array, leg: float) -> MissionSettings:
 
 
 @dataclass(frozen=True)
-class Outcome:
-    """Result of a law's flight."""
-
-    rms: dict[str, float]
-    """RMS of attitude (also in degrees) and joint errors and torques, mean of the axes; empty if it
-    failed."""
-    failure: str
-    """Why the flight ended early; empty if it did not."""
-    score: float
-    """Geometric mean of errors and ripples on `TRIAL`; infinite if it failed there."""
-    trial_failure: str = ""
-    """`DIVERGED` or `BEYOND` if it did that on `TRIAL`; empty if neither or it was not flown."""
-
-
-@dataclass(frozen=True)
 class NewRobot:
-    """The new robot, its files, and the results of its flights."""
+    """The new robot, its files, and the law chosen for it."""
 
     folder: Path
     robot: Robot
     mission: MissionSettings
-    flights: dict[str, Outcome]
-    """Results by law."""
-    default_law: str
-    """The law with the best score, which the gain set names; empty: none flew."""
+    choice: Choice
     remarks: tuple[str, ...] = ()
-    """Remarks on failures and weak laws, on tools and joints that may be passive, in sentences."""
+    """Remarks on weak laws, on tools and joints that may be passive, in sentences."""
 
     @property
     def duration(self) -> float:
@@ -167,13 +145,14 @@ class NewRobot:
             "joints": list(self.robot.joint_names),
             "passive_joints": list(self.robot.passive_names),
             "repaired": list(self.robot.repairs),
-            "default_law": self.default_law,
+            "default_law": self.choice.law,
             "remarks": list(self.remarks),
             "duration": self.duration,
             "laws": {
-                law: {"failure": flown.failure} if flown.failure else {"rms": flown.rms}
-                for law, flown in self.flights.items()
+                each.law: {"failure": each.reason} if each.reason else {"rms": each.rms}
+                for each in self.choice.flown
             },
+            "out": dict(self.choice.out),
         }
 
 
@@ -182,17 +161,19 @@ def make_robot(
     robot: Robot,
     folder: Path,
     command: str,
-    step: Callable[[str], None] = lambda text: None,
+    progress: Progress,
+    options: ChoiceOptions = SHORT,
 ) -> NewRobot:
-    """Create the folder of a robot, and fly every law once with its mission and gains.
+    """Create the folder of a robot, and choose the law that it flies.
 
     Args:
         files: texts of the robot's files by name, see `robot_texts`.
         robot: defined by these files.
         folder: to be created or replaced, see `check_replaceable`; nothing is left of it after an
-            error other than a failed flight.
+            error.
         command: the user's command, for the files' headers.
-        step: called with a description of each step.
+        progress: of the steps.
+        options: of the choice.
 
     Raises:
         InputError: no mission is possible, or the folder cannot be written.
@@ -200,79 +181,45 @@ def make_robot(
     with atomic_folder(folder) as place:
         for name, text in files.items():
             (place / name).write_text(text, "utf-8")
-        (place / CAMPAIGN_FILE).write_text(campaign_text(folder, command), "utf-8")
-        step("mission")
         mission = rest_to_rest(robot)
         (place / OWN_MISSION).write_text(mission_text(robot, mission, command), "utf-8")
-        tuned = tuned_set({"robot": str(place)}, [CASE], WISHES, step)
-        write_set(tuned, command, place / OWN_GAINS / SET)
-        default = f"# The set of each law.\n{OTHERS}: {SET}\n"
-        (place / OWN_GAINS / DEFAULT_SETS).write_text(default, "utf-8")
-        names = sorted(tuned.laws)
-        step(f"flying {', '.join(names)}")
-        flights = dict(zip(names, run_all(partial(_fly, place), names, cores()), strict=True))
-        best = min(names, key=lambda law: flights[law].score)
-        best = best if math.isfinite(flights[best].score) else ""
-        if best:
-            with (place / OWN_GAINS / SET / OF_THE_SET).open("a", encoding="utf-8") as file:
-                file.write(f"    controller: {best}  # flown unless another is named\n")
-    said = f"{best} is flown unless another law is named: {REASON}." if best else ""
+        gains = place / OWN_GAINS
+        choice, tuned = choose({"robot": str(place), **TRIAL}, gains, options, command, progress)
+        if choice.law:
+            choice.install(gains, gains)
+        own = replace(choice, scenario={**choice.scenario, "robot": f"{folder}/"})
+        text = campaign_text(own, folder / OWN_GAINS, command)
+        (place / CAMPAIGN_FILE).write_text(text, "utf-8")
     advice = (
-        said,
-        trial_remark(flights),
+        f"With {CONDITIONS}: {choice.sentence}",
         estimate_remark(tuned),
         tool_remark(robot, folder),
         hinge_remark(robot, command, folder),
     )
-    remarks = (*unit_remarks(robot), *filter(None, advice))
-    return NewRobot(folder, robot, mission, flights, best, remarks)
+    return NewRobot(folder, robot, mission, choice, (*unit_remarks(robot), *filter(None, advice)))
 
 
-def _fly(folder: Path, law: str) -> Outcome:
-    plan = Scenario(controller=law, robot=str(folder), case=CASE)
-    try:
-        metrics = _metrics(plan)
-    except FlightError as error:
-        return Outcome({}, str(error), math.inf)
-    rms = {name: metrics[f"{name}.rms"] for name in of_statistic(metrics, "rms_eq64")}
-    return Outcome(rms, "", *_trial(plan.model_copy(update=TRIAL)))
+def check_replaceable(folder: Path, force: bool, files: Collection[str]) -> None:
+    """Check that a folder can be created or replaced.
 
-
-def _trial(plan: Scenario) -> tuple[float, str]:
-    """Fly a trial and return its score and how it failed.
-
-    Equal ratios count alike in the score, so that units do not matter.
-    """
-    try:
-        metrics = _metrics(plan)
-    except FlightError:
-        return math.inf, DIVERGED
-    if any(of_statistic(metrics, "beyond_effort").values()):
-        return math.inf, BEYOND
-    columns = [name for name in of_statistic(metrics, "rms_eq64") if name != "attitude_angle"]
-    kinds = {name: "ripple" if column_unit(name).startswith("N") else "rms" for name in columns}
-    known = [f"{name}.{kind}" for name, kind in kinds.items() if f"{name}.{kind}" in metrics]
-    values = np.maximum([metrics[name] for name in known], np.finfo(float).tiny)
-    return math.exp(float(np.mean(np.log(values)))), ""
-
-
-def _metrics(plan: Scenario) -> dict[str, float]:
-    """Return the metrics of a flight.
+    Args:
+        folder: to be created.
+        force: True if an existing folder may be replaced.
+        files: names of the robot's files; only these, mission, gains and campaign may be
+            overwritten.
 
     Raises:
-        FlightError: it diverged.
+        InputError: something exists there that must not be overwritten.
     """
-    return measure(simulate(Flight(resolve(plan))))
-
-
-def trial_remark(flights: Mapping[str, Outcome]) -> str:
-    """Say which laws failed on `TRIAL`, and how; empty if none did."""
-    failed = {
-        how: [law for law, flown in flights.items() if flown.trial_failure == how]
-        for how in (DIVERGED, BEYOND)
-    }
-    said = [f"{', '.join(names)} {how}" for how, names in failed.items() if names]
-    return f"With {CONDITIONS}: {'; '.join(said)}." if said else ""
+    if not folder.exists() and not folder.is_symlink():
+        return
+    if not force:
+        raise InputError(f"{folder}: exists already: choose another with --out, or use --force")
+    if not folder.is_dir():
+        raise InputError(f"{folder}: exists and is not a folder; it is not replaced")
+    known = {*files, OWN_MISSION, OWN_GAINS, CAMPAIGN_FILE}
+    if others := sorted(entry.name for entry in folder.iterdir() if entry.name not in known):
+        raise InputError(f"{folder}: also contains {others[0]!r}: it is not replaced")
 
 
 def tool_remark(robot: Robot, folder: Path) -> str:

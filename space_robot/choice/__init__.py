@@ -1,0 +1,17 @@
+"""Which law for a robot: the front of each law, a campaign of the candidates, a recommendation.
+
+| module | |
+|---|---|
+| `search_space` | the gains of a law as a few factors on a tuned set |
+| `trials` | flights of a gain set with a light and a heavy robot, and its score |
+| `front` | the search for the least error at each ripple |
+| `candidates` | one gain set a law, flown with many draws; who is out, and the ranks |
+| `choose` | all of it for a scenario |
+| `gain_files`, `report` | its gains, campaign, tables, JSON and page |
+| `new_robot`, `robot_files` | the folder of a new robot, with the law chosen for it |
+"""
+
+from .choose import Choice, ChoiceOptions, choose
+from .trials import Uncertainty
+
+__all__ = ["Choice", "ChoiceOptions", "Uncertainty", "choose"]

@@ -1,0 +1,183 @@
+"""Candidates: one gain set a law, flown with many draws of what no law knows; ranks and reasons."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import lru_cache, partial
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..analysis.words import limit_cycles
+from ..campaign.draws import Draws
+from ..campaign.study import Study
+from ..campaign.verdicts.laws import PairedComparison, compare
+from ..flight.batch.batch import FlightBatch, batches
+from ..processes.executor import run_all
+from .criteria import CRITERIA, Criterion, Metrics, is_error
+from .search_space import GainPoint
+from .trials import Score, alone
+
+Array = NDArray[np.float64]
+
+OFTEN = 0.1
+"""Share of the flights with a limit cycle, or ended early, from which on a law is out."""
+SATURATED = 0.05
+"""Largest median share of ticks with a wheel at its limit."""
+HELD = 0.5
+"""Largest median share of its way on which friction may hold a joint."""
+GROUP = 8
+"""Flights that a process takes at a time."""
+
+
+class Candidate(NamedTuple):
+    """The gain set with which a law takes part."""
+
+    law: str
+    controller: str
+    """The law as an option of a scenario, such as ``file.py:Class``."""
+    gains: GainPoint
+    score: Score
+    """Of its trials."""
+    folder: str
+    """Its gain files."""
+
+
+class Task(NamedTuple):
+    """Some runs of a law."""
+
+    law: str
+    """As in a campaign: ``LAW=GAINS``."""
+    runs: tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class FlownCandidate:
+    """A candidate and its flights."""
+
+    candidate: Candidate
+    flights: list[dict[str, float]]
+    """Metrics of each run; empty if the flight ended early."""
+
+    @property
+    def law(self) -> str:
+        """Name of the law."""
+        return self.candidate.law
+
+    def values(self, function: Callable[[Metrics], float]) -> Array:
+        """Return a number of each run (N,), infinite if the flight ended early."""
+        return np.array([function(flight) if flight else math.inf for flight in self.flights])
+
+    def median(self, function: Callable[[Metrics], float]) -> float:
+        """Return the median of a number over the runs."""
+        return float(np.median(self.values(function)))
+
+    @property
+    def rms(self) -> dict[str, float]:
+        """Median RMS errors over the runs that were flown."""
+        flown = [flight for flight in self.flights if flight]
+        errors = [name for name in flown[0] if is_error(name)] if flown else []
+        return {
+            name.removesuffix(".rms"): float(np.median([flight[name] for flight in flown]))
+            for name in errors
+        }
+
+    @property
+    def reason(self) -> str:
+        """Why the candidate is out, in a few words; empty if it is not."""
+        count = len(self.flights)
+        if (ended := sum(not flight for flight in self.flights)) > OFTEN * count:
+            return f"diverged in {ended} of {count} flights"
+        flown = [flight for flight in self.flights if flight]
+        cycles = [text for flight in flown for text in limit_cycles(flight)]
+        if len(cycles) > OFTEN * count:
+            return f"{cycles[0]} (in {len(cycles)} of {count} flights)"
+        if any(any(_of(flight, ".beyond_effort").values()) for flight in flown):
+            return "joints beyond their limits of effort"
+        share = float(np.median([flight.get("wheels.saturation", 0.0) for flight in flown]))
+        if share > SATURATED:
+            return f"wheels at their limit in {share:.0%} of the ticks"
+        for name in _of(flown[0], ".standing"):
+            held = float(np.median([flight.get(f"{name}.standing", 0.0) for flight in flown]))
+            if held > HELD:
+                return f"{name} held by friction on {held:.0%} of its way"
+        return ""
+
+
+def fly_candidates(
+    study: Study,
+    candidates: Sequence[Candidate],
+    criterion: str,
+    runs: int,
+    seed: int,
+    workers: int,
+    progress: Callable[[int], Callable[[], None]] = lambda total: lambda: None,
+) -> list[FlownCandidate]:
+    """Fly every candidate with the same draws.
+
+    Args:
+        study: scenario and distributions; its laws do not count.
+        candidates: of different laws.
+        criterion: name of one of `CRITERIA`.
+        runs: draws.
+        seed: of the draws.
+        workers: see `run_many`.
+        progress: see `run_all`.
+    """
+    laws = [f"{c.controller}={c.folder}" for c in candidates]
+    text = study.model_copy(update={"laws": laws}).model_dump_json(by_alias=True)
+    groups = [tuple(range(k, min(k + GROUP, runs))) for k in range(0, runs, GROUP)]
+    tasks = [Task(law, group) for group in groups for law in laws]
+    flown = run_all(partial(_fly, text, seed, runs, criterion), tasks, workers, progress)
+    by_law: dict[str, list[dict[str, float]]] = {law: [] for law in laws}
+    for task, flights in zip(tasks, flown, strict=True):
+        by_law[task.law] += flights
+    return [FlownCandidate(c, by_law[law]) for c, law in zip(candidates, laws, strict=True)]
+
+
+def ranked(flown: Sequence[FlownCandidate], criterion: Criterion) -> list[FlownCandidate]:
+    """Return the candidates that are not out, the best one first."""
+    able = [each for each in flown if not each.reason]
+    if not able:
+        return []
+    least = min(each.median(criterion.error) for each in able)
+    near = [each for each in able if each.median(criterion.error) <= criterion.near * least]
+    return sorted(near, key=lambda each: each.median(criterion.value))
+
+
+def comparisons(order: Sequence[FlownCandidate], criterion: Criterion) -> list[PairedComparison]:
+    """Compare the first candidate with each of the others over the same draws."""
+    first, *others = order
+    own = first.values(criterion.value)
+    return [
+        compare(own, other.values(criterion.value), law=first.law, other=other.law)
+        for other in others
+    ]
+
+
+def _fly(text: str, seed: int, runs: int, criterion: str, task: Task) -> list[dict[str, float]]:
+    draws = _draws(text, seed, runs)
+    flights = [draws.flight(run, task.law) for run in task.runs]
+    metrics: list[dict[str, float]] = [{} for _ in flights]
+    for group in batches(enumerate(flights)):
+        if len(group) == 1:
+            number, flight = group[0]
+            log, share = alone(flight)
+            metrics[number] = CRITERIA[criterion].of(log) if share >= 1.0 else {}
+            continue
+        for flown in FlightBatch([flight for _, flight in group]).fly():
+            if flown.ending.error is None:
+                metrics[group[flown.flight][0]] = CRITERIA[criterion].of(flown.log)
+    return metrics
+
+
+@lru_cache(maxsize=2)
+def _draws(text: str, seed: int, runs: int) -> Draws:
+    return Draws(Study.model_validate_json(text), seed, runs, check=False)
+
+
+def _of(metrics: Mapping[str, float], end: str) -> dict[str, float]:
+    return {k.removesuffix(end): value for k, value in metrics.items() if k.endswith(end)}

@@ -1,0 +1,275 @@
+"""The choice of a law for a robot, its hardware and its mission."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import AbstractContextManager
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from space_robot_control.laws import find_law, laws
+from space_robot_msgs_py.errors import InputError
+from space_robot_sim.environment.friction import coefficients
+
+from ..analysis.analysed_log import AnalysedLog
+from ..api import Scenario
+from ..campaign.gain_set import tuned_set, write_set
+from ..campaign.study import Law, Study
+from ..campaign.verdicts.laws import PairedComparison
+from ..flight.flown_log import empty_log
+from ..flight.plan import Flight, resolve
+from ..processes.executor import run_all
+from ..tuning.method import Tuned
+from ..tuning.task import AUTO, TuningOptions, force_demand
+from .candidates import Candidate, FlownCandidate, comparisons, fly_candidates, ranked
+from .criteria import CRITERIA
+from .front import RIPPLE_WEIGHTS, Front, search_front
+from .gain_files import install, write_gains
+from .search_space import GainPoint, SearchSpace
+from .trials import Trials, Uncertainty
+
+Array = NDArray[np.float64]
+Progress = Callable[[str], AbstractContextManager[Callable[[int], Callable[[], None]]]]
+"""Shows a step by its description, see `console.progress.counting_progress`."""
+
+INITIAL_TUNING = TuningOptions(margin=0.05, mass_uncertainty=0.2, h_bar=AUTO)
+"""Requirements on the gains from which the search starts."""
+
+
+@dataclass(frozen=True)
+class ChoiceOptions:
+    """How a law is chosen."""
+
+    criterion: str = "tracking"
+    """Name of one of `CRITERIA`."""
+    ripple: float = 0.05
+    """Largest ripple of the torques, as a share of the largest one in the mission."""
+    laws: tuple[str, ...] = ()
+    """That take part, also ``file.py:Class``; empty: all of this project."""
+    evaluations: int = 240
+    """Gain sets tried for each law."""
+    weights: tuple[float, ...] = RIPPLE_WEIGHTS
+    """Of the ripple in the search, see `front`."""
+    longest_s: float = 12.0
+    """Longest trial; of a longer mission the beginning is flown, s."""
+    runs: int = 24
+    """Draws that every candidate flies."""
+    seed: int = 1
+    workers: int = 1
+    uncertainty: Uncertainty = field(default_factory=Uncertainty)
+
+
+@dataclass(frozen=True)
+class Choice:
+    """What was found."""
+
+    scenario: Mapping[str, Any]
+    """Options of the scenario."""
+    options: ChoiceOptions
+    fronts: Mapping[str, Front]
+    """By law."""
+    flown: Sequence[FlownCandidate]
+    order: Sequence[FlownCandidate]
+    """Those that are not out, the best one first."""
+    compared: Sequence[PairedComparison]
+    """The best one with each of the others of the order."""
+    out: Mapping[str, str]
+    """Why a law is out, by law."""
+    vary: Mapping[str, Any]
+    """What differed from draw to draw, as a campaign has it."""
+
+    @property
+    def law(self) -> str:
+        """The law to fly; empty: none can."""
+        return self.order[0].law if self.order else ""
+
+    @property
+    def sentence(self) -> str:
+        """The recommendation and its reason."""
+        if not self.order:
+            return "No law flies this mission with these sensors and actuators."
+        criterion = CRITERIA[self.options.criterion]
+        best = self.order[0]
+        text = f"Fly {best.law}: of {len(self.flown)} laws it has the least {criterion.text}"
+        text += f" ({best.median(criterion.value):.3g} in the median of {len(best.flights)} draws)"
+        if not self.compared:
+            return f"{text}."
+        worse = [c.other for c in self.compared if c.finding == "better"]
+        alike = [c.other for c in self.compared if c.finding != "better"]
+        parts = []
+        if worse:
+            ratio = 1.0 / next(c.ratio.value for c in self.compared if c.other == worse[0])
+            parts.append(f"{worse[0]}, the next one, has {ratio:.2g} times as much")
+        if alike:
+            parts.append(f"{' and '.join(alike)} cannot be told from it")
+        return f"{text}; {'; '.join(parts)}."
+
+    def install(self, folder: Path, gains: Path) -> Path:
+        """Make the law with its gains the default of a robot; return the set's folder.
+
+        A set has one low-pass: laws whose estimate has another are left to their own folders.
+
+        Args:
+            folder: of the choice.
+            gains: of the robot.
+
+        Raises:
+            InputError: a file cannot be written.
+        """
+        corner = self.order[0].candidate.gains.corner_hz
+        others = [
+            each.law
+            for each in self.flown
+            if each.law != self.law
+            and (each.candidate.gains.corner_hz == corner or not has_estimate(each.law))
+        ]
+        return install(folder, [self.law, *others], self.law, gains)
+
+
+def choose(
+    scenario: Mapping[str, Any],
+    folder: Path,
+    options: ChoiceOptions,
+    command: str,
+    progress: Progress,
+) -> tuple[Choice, Tuned]:
+    """Search the front of each law, fly a candidate of each with many draws, and rank them.
+
+    Args:
+        scenario: options of a `Scenario`, without law and gains.
+        folder: that exists, for the gains of the candidates.
+        options: of the choice.
+        command: the user's command, for the files' headers.
+        progress: of the steps.
+
+    Returns:
+        The choice, and the gains from which the search began.
+
+    Raises:
+        InputError: the scenario cannot be flown, or it has no such law.
+    """
+    names = options.laws or tuple(sorted(laws()))
+    of_tuning = {key: scenario[key] for key in TUNED if key in scenario}
+    tuned = tuned_set(
+        of_tuning, [str(scenario.get("case", "1"))], INITIAL_TUNING, lambda text: None
+    )
+    write_set(tuned, command, folder / TUNED_SET)
+    points, gains = tuned_points(tuned), f"{folder}/{TUNED_SET}"
+    search = _Search(dict(scenario), gains, points, {}, np.empty((0, 2)), options)
+    nominal = Scenario(**search.options_of(names[0])).check()
+    known = nominal.scenario.robots.controller
+    friction = coefficients(known, nominal.plant_settings.friction)[: known.n]
+    search = replace(search, torques=torques_of(nominal), friction=friction)
+    with progress("fronts of the laws") as begin:
+        found = run_all(search, names, min(options.workers, len(names)), begin)
+    fronts = {front.law: front for front in found}
+    out: dict[str, str] = {}
+    candidates = []
+    for law, front in zip(names, found, strict=True):
+        controller = Law.parse(law).controller
+        tried = front.within(options.ripple)
+        if tried is None:
+            out[front.law] = front.why_none(options.ripple)
+            continue
+        point = search.space(law).at(tried.point)
+        where = write_gains(controller, point, folder, command, tried.score)
+        candidates.append(Candidate(front.law, controller, point, tried.score, f"{where}/"))
+    study = study_of(scenario, nominal, options.uncertainty)
+    with progress("flights of the candidates") as begin:
+        flown = fly_candidates(
+            study, candidates, options.criterion, options.runs, options.seed, options.workers, begin
+        )
+    criterion = CRITERIA[options.criterion]
+    order = ranked(flown, criterion)
+    out |= {each.law: each.reason for each in flown if each.reason}
+    compared = comparisons(order, criterion) if order else []
+    found_law = Choice(dict(scenario), options, fronts, flown, order, compared, out, study.vary)
+    return found_law, tuned
+
+
+TUNED_SET = "tuned"
+"""Name of the set from which the search starts."""
+TUNED = ("robot", "mission", "sensors", "navigation", "orbit", "period", "parameters")
+"""Options of a scenario that gains are tuned for."""
+
+
+def has_estimate(law: str) -> bool:
+    """Return True if a law has an estimate behind the low-pass of the set."""
+    kind = find_law(law)
+    return "h_bar" in kind.gain_descriptions() or kind.estimates_with_model
+
+
+def torques_of(flight: Flight) -> dict[str, float]:
+    """Return the largest torque that a mission asks of each group of axes, N m or N."""
+    scenario = flight.scenario
+    demand = force_demand(scenario.robots.controller, scenario.mission, [scenario.plant])
+    columns = AnalysedLog(empty_log(flight, 0, 1, is_brief=True)).torque_columns
+    return {name: float(np.mean(demand.peak[axes])) for name, axes in columns.items()}
+
+
+def study_of(scenario: Mapping[str, Any], nominal: Flight, uncertainty: Uncertainty) -> Study:
+    """Return the campaign of the candidates, without laws of its own."""
+    own = any(not np.isnan(joint.coulomb) for joint in nominal.robot.friction)
+    return Study(
+        scenario=dict(scenario), laws=[nominal.law.name], vary=uncertainty.vary(own_friction=own)
+    )
+
+
+def tuned_points(tuned: Tuned) -> dict[str, GainPoint]:
+    """Return the gains of a tuned set by law."""
+    return {law: GainPoint(own.gains, tuned.corner_hz) for law, own in tuned.laws.items()}
+
+
+@dataclass(frozen=True)
+class _Search:
+    """Searches the front of a law; it can be sent to other processes."""
+
+    scenario: dict[str, Any]
+    gains: str
+    points: dict[str, GainPoint]
+    torques: dict[str, float]
+    friction: Array
+    """f_C and f_V (n, 2) of the joints as a user knows them."""
+    options: ChoiceOptions
+
+    def __call__(self, law: str) -> Front:
+        """Return the front of a law."""
+        options, given = self.options, Scenario(**self.options_of(law))
+        flight = given.check()
+        duration = min(flight.ticks * flight.period, options.longest_s)
+        trials = Trials(
+            Scenario(**{**self.options_of(law), "duration": duration}),
+            options.uncertainty,
+            self.torques,
+            CRITERIA[options.criterion],
+        )
+        space = self.space(law)
+        return search_front(trials, space, options.evaluations, options.seed, options.weights)
+
+    def options_of(self, law: str) -> dict[str, Any]:
+        """Return the options of the scenario with a law."""
+        controller, gains = Law.parse(law)
+        own = gains if "=" in law else self.gains
+        return {**self.scenario, "controller": controller, "gains": own}
+
+    def space(self, law: str) -> SearchSpace:
+        """Return the search space of a law.
+
+        Raises:
+            InputError: nothing is known of its gains.
+        """
+        controller, has_base = Law.parse(law).controller, self.scenario.get("actuators") != "none"
+        start = self.points.get(controller)
+        if "=" in law:
+            scenario = resolve(Scenario(**self.options_of(law)))
+            corner = scenario.controller.acceleration_filter_hz
+            start = GainPoint(scenario.law.gain_values, corner)
+        if start is None:
+            raise InputError(f"law {controller}: has no tuned gains: give some, {controller}=GAINS")
+        return SearchSpace(
+            find_law(controller), start, self.friction, has_base, has_estimate(controller)
+        )

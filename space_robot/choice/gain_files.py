@@ -1,0 +1,75 @@
+"""Gain files of candidates, and the set that a robot flies by default."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from space_robot_control.controller.settings import DEFAULT_SETS, OF_THE_SET, OTHERS
+from space_robot_control.laws import find_law
+
+from ..console.files import make_folder, write_text
+from ..tuning.gain_file import gain_text, set_text
+from .search_space import GainPoint
+from .trials import Score
+
+CHOSEN = "chosen"
+"""Name of the set."""
+
+
+def write_gains(
+    controller: str, point: GainPoint, folder: Path, command: str, score: Score
+) -> Path:
+    """Write the gains of a law as a set of its own; return its folder.
+
+    Args:
+        controller: the law, see `find_law`.
+        point: its gains.
+        folder: in which the set's folder is made, with the law's name.
+        command: the user's command, for the header.
+        score: of its trials.
+
+    Raises:
+        InputError: the folder cannot be created or written.
+    """
+    law = find_law(controller).name
+    folder = folder / law
+    make_folder(folder)
+    comments = [
+        f"Made by `{command}`.",
+        f"In trials with a light and a heavy robot: error {score.error:.3g}, ripple "
+        f"{score.ripple:.2%} of the largest torque.",
+    ]
+    write_text(gain_text(comments, law, point.gains), folder / f"{law}.yaml", replace=True)
+    write_text(set_text(comments, point.corner_hz), folder / OF_THE_SET, replace=True)
+    return folder
+
+
+def install(choice_folder: Path, laws: Sequence[str], law: str, gains: Path) -> Path:
+    """Make a law with its gains the default of a robot.
+
+    Args:
+        choice_folder: with the sets of all candidates.
+        laws: whose gains go into the set, the default one first; all of one low-pass.
+        law: the default law.
+        gains: folder of the robot's gains.
+
+    Returns:
+        The set's folder.
+
+    Raises:
+        InputError: a file cannot be written.
+    """
+    folder = gains / CHOSEN
+    make_folder(folder)
+    for name in laws:
+        text = (choice_folder / name / f"{name}.yaml").read_text("utf-8")
+        write_text(text, folder / f"{name}.yaml", replace=True)
+    text = (choice_folder / law / OF_THE_SET).read_text("utf-8")
+    write_text(
+        f"{text}    controller: {law}  # flown unless another is named\n",
+        folder / OF_THE_SET,
+        replace=True,
+    )
+    write_text(f"# The set of each law.\n{OTHERS}: {CHOSEN}\n", gains / DEFAULT_SETS, replace=True)
+    return folder

@@ -1,0 +1,194 @@
+"""A choice as tables, JSON, a figure and a page."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import yaml
+from matplotlib.figure import Figure
+
+from ..analysis.figures.figure_set import SavedFigure
+from ..analysis.figures.style import COLOURS, house_style, page, save_figure
+from ..analysis.page import template
+from ..console.files import make_folder, write_text
+from ..console.tables import Column, Group, JudgedCell, Table
+from ..console.terminal import json_text
+from ..processes.software import versions
+from .choose import Choice
+from .criteria import CRITERIA
+from .front import Front
+
+CAMPAIGN = "campaign.yaml"
+CAMPAIGN_LAWS, CAMPAIGN_RUNS = 4, 200
+"""Laws and runs of the campaign that continues the comparison."""
+SHARES = (0.001, 0.003, 0.01, 0.03, 0.1)
+"""Ripples at which the table of fronts shows errors."""
+
+
+def candidates_table(choice: Choice, notes: Sequence[str] = ()) -> Table:
+    """Return the laws, the best one first, with what their candidates flew."""
+    criterion = CRITERIA[choice.options.criterion]
+    order = {each.law: number for number, each in enumerate(choice.order, 1)}
+    flown = {each.law: each for each in choice.flown}
+    found = {c.other: c for c in choice.compared}
+    rows: list[list[Any]] = []
+    for law in sorted(choice.fronts, key=lambda law: (order.get(law, math.inf), law)):
+        each = flown.get(law)
+        numbers: list[Any] = [None, None, None]
+        if each:
+            numbers = [
+                each.median(criterion.value),
+                100.0 * each.candidate.score.ripple,
+                100.0 * each.median(lambda flight: flight.get("wheels.saturation", 0.0)),
+            ]
+            numbers = [number if math.isfinite(number) else None for number in numbers]
+        if law == choice.law:
+            verdict = JudgedCell("", "chosen", "good")
+        elif law in choice.out:
+            verdict = JudgedCell(choice.out[law], "out", "bad")
+        elif law in found:
+            word = {"better": "worse", "worse": "better"}.get(found[law].finding, "alike")
+            verdict = JudgedCell(f"{1.0 / found[law].ratio.value:.3g} times", word, "open")
+        else:
+            verdict = JudgedCell("too far from the least error", "out", "bad")
+        rows.append([order.get(law), law, *numbers, verdict])
+    columns = [
+        Column("rank", "", "d"),
+        Column("law", is_label=True),
+        Column("median", "", ".3g"),
+        Column("ripple", "%", ".2g"),
+        Column("wheels at limit", "%", ".2g"),
+        Column("beside the first", is_label=True),
+    ]
+    title = f"{criterion.text}, {choice.options.runs} draws"
+    return Table(title, columns, [Group(rows)], notes)
+
+
+def fronts_table(choice: Choice) -> Table:
+    """Return the least error of each law at some ripples."""
+    rows = [
+        [law, *(_finite(front.error_at(share)) for share in SHARES)]
+        for law, front in choice.fronts.items()
+    ]
+    columns = [
+        Column("law", is_label=True),
+        *(Column(f"ripple {share:.1%}", "", ".3g") for share in SHARES),
+    ]
+    return Table.of("Least error in the trials with a ripple of at most", columns, rows)
+
+
+def report(choice: Choice) -> dict[str, Any]:
+    """Return a choice as data for JSON."""
+    options = choice.options
+    return {
+        "law": choice.law,
+        "sentence": choice.sentence,
+        "criterion": options.criterion,
+        "scenario": dict(choice.scenario),
+        "runs": options.runs,
+        "seed": options.seed,
+        "evaluations": options.evaluations,
+        "order": [each.law for each in choice.order],
+        "out": dict(choice.out),
+        "candidates": {
+            each.law: {
+                "gains": {k: v.tolist() for k, v in each.candidate.gains.gains.items()},
+                "acceleration_filter_hz": each.candidate.gains.corner_hz,
+                "trials": dict(each.candidate.score.metrics),
+                "value": _finite(each.median(CRITERIA[options.criterion].value)),
+            }
+            for each in choice.flown
+        },
+        "compared": [
+            {
+                "law": c.other,
+                "finding": c.finding,
+                "ratio": _finite(c.ratio.value),
+                "p": c.p_better,
+                "better": c.better,
+                "worse": c.worse,
+            }
+            for c in choice.compared
+        ],
+        "fronts": {
+            law: [
+                {"ripple": tried.score.ripple, "error": tried.score.error} for tried in front.best
+            ]
+            for law, front in choice.fronts.items()
+        },
+        "versions": versions(),
+    }
+
+
+def campaign_text(choice: Choice, folder: Path, command: str) -> str:
+    """Return a campaign of the best laws, which continues the comparison."""
+    laws = [f"{each.law}={folder / each.law}/" for each in choice.order[:CAMPAIGN_LAWS]]
+    study = {
+        "scenario": dict(choice.scenario),
+        "laws": laws,
+        "vary": choice.vary,
+        "runs": CAMPAIGN_RUNS,
+    }
+    head = f"# Made by `{command}`: the best laws, each with its gains, over more draws.\n"
+    return head + yaml.safe_dump(study, sort_keys=False, allow_unicode=True, width=100)
+
+
+def fronts_figure(fronts: Mapping[str, Front], chosen: str = "") -> Figure:
+    """Draw error against ripple for each law; a dot is a gain set on its front."""
+    figure = page(95.0)
+    axes = figure.add_subplot()
+    for number, (law, front) in enumerate(fronts.items()):
+        points = np.array([(t.score.ripple, t.score.error) for t in front.best])
+        if not len(points):
+            continue
+        axes.step(
+            100.0 * points[:, 0],
+            points[:, 1],
+            where="post",
+            color=COLOURS[number % len(COLOURS)],
+            linestyle=("-", "--")[number // len(COLOURS) % 2],
+            linewidth=2.2 if law == chosen else 1.2,
+            marker=".",
+            label=law,
+        )
+    axes.set_xscale("log")
+    axes.set_yscale("log")
+    axes.set_xlabel("ripple of the torques, % of the largest in the mission")
+    axes.set_ylabel("error")
+    axes.grid(True, which="major", alpha=0.3)
+    axes.legend(loc="center left", bbox_to_anchor=(1.01, 0.5), frameon=False)
+    return figure
+
+
+def write_report(choice: Choice, folder: Path, command: str) -> Path:
+    """Write page, figure, JSON and campaign; return the page.
+
+    Raises:
+        InputError: they cannot be written.
+    """
+    make_folder(folder)
+    with house_style():
+        files = save_figure(fronts_figure(choice.fronts, choice.law), folder / "fronts", png=True)
+    figure = SavedFigure("Error against ripple: the fronts of the laws", files[-1])
+    text = template("space_robot.choice", "choice.html.j2").render(
+        robot=str(choice.scenario.get("robot", "paper")),
+        sentence=choice.sentence,
+        tables=[candidates_table(choice), fronts_table(choice)],
+        figure=figure,
+        scenario=yaml.safe_dump(dict(choice.scenario), sort_keys=False),
+        options=choice.options,
+        command=command,
+    )
+    write_text(text, folder / "index.html", replace=True)
+    write_text(json_text(report(choice)), folder / "choice.json", replace=True)
+    if choice.order:
+        write_text(campaign_text(choice, folder, command), folder / CAMPAIGN, replace=True)
+    return folder / "index.html"
+
+
+def _finite(value: float) -> float | None:
+    return value if math.isfinite(value) else None

@@ -1,0 +1,225 @@
+"""Search space of a law's gains: factors on a tuned set, most of them a bandwidth's.
+
+A law has three to a dozen gains on each axis, which are not searched one by one: gains of one
+bandwidth move together, as in ``k_p = W^2``, ``k_d = 2 W``, and the tuned set has the ratios of the
+axes by their inertia. A coordinate is the logarithm of one such factor, for the base and for the
+joints each, or for all axes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from space_robot_control.laws import ControlLaw
+
+Array = NDArray[np.float64]
+
+BASE_AXES = 3
+
+
+class Factor(NamedTuple):
+    """A factor on gains of a law."""
+
+    name: str
+    powers: Mapping[str, float]
+    """Power of the factor with which each gain is multiplied."""
+    lowest: float
+    highest: float
+    is_common: bool = False
+    """One factor for all axes; else the base has one, and the joints have another."""
+
+
+def bandwidth(**powers: float) -> Factor:
+    """Return the factor on a bandwidth W, of which gains are powers."""
+    return Factor("bandwidth", powers, 0.05, 50.0)
+
+
+DAMPING = Factor("damping", {"k_d": 1.0}, 0.4, 2.5, is_common=True)
+H_BAR = Factor("inertia of the estimate", {"h_bar": 1.0}, 0.05, 20.0)
+INTEGRAL = Factor("integral", {"k_i": 1.0}, 1e-3, 0.5, is_common=True)
+"""K_I as a share of that with which the integral is as fast as the loop."""
+FRICTION = Factor("friction fed forward", {"viscous": 1.0, "coulomb": 1.0}, 0.01, 1.5, True)
+"""Share of the nominal friction."""
+DEAD_BAND = Factor("dead band", {"dead_band": 1.0}, 0.01, 100.0, is_common=True)
+DEAD_BAND_RATE = 1e-3
+"""On which the factor of the dead band counts, rad/s or m/s."""
+FILTER = "low-pass of the estimate"
+"""The one factor on a number of the set instead of a law's: its corner frequency."""
+SLOWEST_HZ, FASTEST_HZ = 2.0, 900.0
+"""Corner frequencies of that low-pass between which is searched."""
+AGAINST_FRICTION = (INTEGRAL, FRICTION, DEAD_BAND)
+KNOWN: Mapping[str, Sequence[Factor]] = {
+    "pd": [bandwidth(k_p=2, k_d=1), DAMPING, *AGAINST_FRICTION],
+    "pd_feedforward": [bandwidth(k_p=2, k_d=1), DAMPING, *AGAINST_FRICTION],
+    "ctc": [bandwidth(k_p=2, k_d=1), DAMPING, *AGAINST_FRICTION],
+    "ctc_smc": [
+        bandwidth(lambda_=1, delta=-1),
+        Factor("switching", {"g": 1.0, "delta": 1.0}, 0.02, 20.0),
+        Factor("boundary layer", {"delta": 1.0}, 0.03, 30.0, is_common=True),
+        *AGAINST_FRICTION,
+    ],
+    "slotine_li": [
+        bandwidth(lambda_=1, k_d=1),
+        DAMPING,
+        Factor("adaptation", {"gamma": 1.0}, 1e-3, 1e3, is_common=True),
+        *AGAINST_FRICTION,
+    ],
+    "indi": [bandwidth(k_p=2, k_d=1), DAMPING],
+    "dob": [
+        Factor("inertia", {"inertia": 1.0}, 0.05, 20.0),
+        Factor("observer", {"bandwidth": 1.0}, 0.02, 20.0),
+        bandwidth(k_p=2, k_d=1),
+    ],
+    "adrc": [
+        Factor("inertia", {"inertia": 1.0}, 0.05, 20.0),
+        Factor("observer", {"omega_o": 1.0}, 0.05, 20.0),
+        bandwidth(omega_c=1),
+    ],
+    "tde_smc": [H_BAR, bandwidth(lambda_=1), Factor("switching", {"g": 1.0}, 1e-3, 30.0)],
+    "tde_tsmc": [
+        H_BAR,
+        bandwidth(k_p=2, k_d=1),
+        Factor("reaching", {"k_1": 1.0}, 1e-2, 30.0, is_common=True),
+    ],
+    "tde_stc": [
+        H_BAR,
+        bandwidth(lambda_=1, k_1=0.5, k_2=1),
+        Factor("switching", {"k_1": 0.5, "k_2": 1.0}, 1e-3, 1e2, is_common=True),
+    ],
+}
+"""Factors of the project's laws."""
+OWN_RANGE = 30.0
+"""Factor by which each gain of a user's law is searched up and down, where it declares none."""
+
+
+class Coordinate(NamedTuple):
+    """One number of a search: the logarithm of a factor on some axes."""
+
+    label: str
+    powers: Mapping[str, float]
+    axes: slice
+    lowest: float
+    highest: float
+
+
+@dataclass(frozen=True)
+class GainPoint:
+    """Gains of a law, and the low-pass of its estimate."""
+
+    gains: Mapping[str, Array]
+    """By name, (m,) each."""
+    corner_hz: float
+    """0: none."""
+
+
+class SearchSpace:
+    """Factors on the gains of one law, each between 0 and 1 in a point (d,) of the search."""
+
+    def __init__(
+        self,
+        law: type[ControlLaw],
+        start: GainPoint,
+        friction: Array,
+        controls_base: bool,
+        has_low_pass: bool,
+    ) -> None:
+        """Lay out the coordinates.
+
+        Args:
+            law: class of the law.
+            start: from which the factors count; gains against friction that are zero in it count
+                from the friction and from the bandwidth.
+            friction: f_C and f_V (n, 2) of the joints as they are known, N m and N m s/rad.
+            controls_base: whether the base has actuators; else its gains are not searched.
+            has_low_pass: whether the law has an estimate behind the low-pass of the set.
+        """
+        axes = len(next(iter(start.gains.values())))
+        zeros = {name: np.zeros(axes) for name in law.gain_descriptions()}
+        self.start = start = GainPoint({**zeros, **start.gains}, start.corner_hz)
+        self._known = {name: np.zeros(axes) for name in ("coulomb", "viscous", "dead_band")}
+        self._known["coulomb"][BASE_AXES:], self._known["viscous"][BASE_AXES:] = friction.T
+        self._known["dead_band"][BASE_AXES:] = DEAD_BAND_RATE
+        factors = KNOWN.get(law.name) or _of_each_gain(law, start.gains)
+        parts = {"base ": slice(0, BASE_AXES)} if controls_base else {}
+        parts |= {"joints ": slice(BASE_AXES, None)}
+        self.coordinates: list[Coordinate] = []
+        for factor in factors:
+            powers = {name.rstrip("_"): power for name, power in factor.powers.items()}
+            if not any(self._reference(name, start.gains).any() for name in powers):
+                continue  # h_bar of the nominal model, or no friction
+            if factor is DEAD_BAND and not friction[:, 0].any():
+                continue
+            of_parts = {"": slice(None)} if factor.is_common else parts
+            self.coordinates += [
+                Coordinate(part + factor.name, powers, axes, factor.lowest, factor.highest)
+                for part, axes in of_parts.items()
+            ]
+        if has_low_pass:
+            corner = start.corner_hz or FASTEST_HZ
+            self.coordinates.append(
+                Coordinate(FILTER, {}, slice(None), SLOWEST_HZ / corner, FASTEST_HZ / corner)
+            )
+        self._low, self._high = (
+            np.log([getattr(c, end) for c in self.coordinates]) for end in ("lowest", "highest")
+        )
+
+    @property
+    def dimension(self) -> int:
+        """Number of coordinates."""
+        return len(self.coordinates)
+
+    @property
+    def origin(self) -> Array:
+        """The point (d,) of the start."""
+        origin: Array = -self._low / (self._high - self._low)
+        for k, coordinate in enumerate(self.coordinates):
+            if any(not self.start.gains[name].any() for name in coordinate.powers):
+                origin[k] = 0.0
+        return np.clip(origin, 0.0, 1.0)
+
+    def at(self, point: Array) -> GainPoint:
+        """Return the gains at a point (d,)."""
+        gains = {name: values.copy() for name, values in self.start.gains.items()}
+        corner = self.start.corner_hz
+        factors = np.exp(self._low + np.clip(point, 0.0, 1.0) * (self._high - self._low))
+        for (label, powers, axes, _, _), factor in zip(self.coordinates, factors, strict=True):
+            if label == FILTER:
+                corner = float((self.start.corner_hz or FASTEST_HZ) * factor)
+            for name, power in powers.items():
+                gains[name][axes] = self._reference(name, gains)[axes] * factor**power
+        return GainPoint(gains, corner)
+
+    def _reference(self, name: str, gains: Mapping[str, Array]) -> Array:
+        """Return what a factor on a gain (m,) counts from."""
+        if gains[name].any():
+            return gains[name]
+        if name == "k_i":
+            return _fast_integral(gains)
+        return self._known.get(name, gains[name])
+
+
+def _fast_integral(gains: Mapping[str, Array]) -> Array:
+    """Return the K_I (m,) of an integral that is as fast as the loop: K_P W, or lambda^2."""
+    if "k_p" in gains:
+        fast: Array = 2.0 * gains["k_p"] ** 2 / gains["k_d"]
+        return fast
+    return gains["lambda"] ** 2
+
+
+def _of_each_gain(law: type[ControlLaw], gains: Mapping[str, Array]) -> list[Factor]:
+    """Return a factor on each gain of a user's law, within the range that it declares."""
+    factors = []
+    for name, values in gains.items():
+        if not values.any():
+            continue
+        low, high = 1.0 / OWN_RANGE, OWN_RANGE
+        if (declared := law.gain_ranges().get(name)) and not declared.per_inertia:
+            middle = float(np.median(values[values > 0.0]))
+            low, high = max(declared.lower, 1e-3 * middle) / middle, declared.upper / middle
+        factors.append(Factor(name, {name: 1.0}, min(low, 1.0), max(high, 1.0)))
+    return factors

@@ -1,0 +1,217 @@
+"""Trial flights of a gain set: the mission's beginning, with a light and a heavy robot.
+
+The two differ from the nominal flight in everything that a gain set needs margin for, each in the
+direction in which errors add up: the light robot's loop is the fastest, that of the heavy robot
+has the least share of the force that an estimate counts on.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from space_robot_msgs_py.bag.flight_log import FlightLog
+from space_robot_msgs_py.config.files import merge
+from space_robot_msgs_py.errors import FlightError
+
+from ..api import Scenario
+from ..campaign.draws.nominal import Nominal, Variation
+from ..campaign.draws.paths import Path, Unavailable, value_at
+from ..flight.batch.batch import FlightBatch, batches
+from ..flight.plan import Flight
+from ..flight.simulate import simulate
+from .criteria import Criterion, Metrics
+from .search_space import GainPoint
+
+Array = NDArray[np.float64]
+
+
+class Corner(NamedTuple):
+    """Factors on the numbers of a nominal flight."""
+
+    mass: float
+    torque_scale: float
+    friction: float
+    latency_ticks: int
+
+
+@dataclass(frozen=True)
+class Uncertainty:
+    """How wrong the numbers may be that a law knows: shares, and ticks."""
+
+    mass: float = 0.2
+    torque_scale: float = 0.05
+    friction: float = 0.5
+    latency_ticks: int = 1
+
+    @property
+    def corners(self) -> tuple[Corner, Corner]:
+        """The light robot and the heavy one."""
+        mass, scale, friction = self.mass, self.torque_scale, self.friction
+        return (
+            Corner(1.0 - mass, 1.0 + scale, 1.0 - friction, self.latency_ticks),
+            Corner(1.0 + mass, 1.0 - scale, 1.0 + friction, 0),
+        )
+
+    def vary(self, own_friction: bool) -> dict[str, Any]:
+        """Return the same as distributions of a campaign.
+
+        Args:
+            own_friction: whether the robot's file has friction of its joints; else the case has.
+        """
+
+        def within(share: float) -> dict[str, Any]:
+            return {"uniform": [1.0 - share, 1.0 + share]}
+
+        relative: Any = {"relative": True}
+        friction = "robot.joints[*].friction" if own_friction else "plant.friction"
+        return {
+            **{
+                f"robot.{body}.{number}": within(self.mass) | relative
+                for body in ("base", "links[*]")
+                for number in ("mass", "inertia")
+            },
+            **{
+                f"{friction}.{kind}": within(self.friction) | relative
+                for kind in ("coulomb", "viscous")
+            },
+            "faults": {"torque_scale@0:all": within(self.torque_scale)},
+            "plant.command_latency_ticks": {"choice": list(range(self.latency_ticks + 1))},
+        }
+
+
+class Score(NamedTuple):
+    """What the trials of a gain set showed."""
+
+    error: float
+    """By the criterion."""
+    ripple: float
+    """Largest ripple of a group of torques, as a share of its largest torque in the mission."""
+    saturation: float
+    """Share of the ticks with any wheel at a limit."""
+    flown: float
+    """Share of the trials' time that was flown before a flight ended early; 1: all of it."""
+    beyond: bool
+    """True if a joint was beyond its effort limit."""
+    metrics: Mapping[str, float]
+    """RMS over the trials, by name."""
+
+    @property
+    def is_flyable(self) -> bool:
+        """True if no trial ended early or went beyond the joints' limits."""
+        return self.flown >= 1.0 and not self.beyond
+
+
+class Trials:
+    """The trial flights of one law."""
+
+    def __init__(
+        self,
+        scenario: Scenario,
+        uncertainty: Uncertainty,
+        torques: Mapping[str, float],
+        criterion: Criterion,
+    ) -> None:
+        """Resolve the scenario once.
+
+        Args:
+            scenario: with law, gains, hardware, and a duration.
+            uncertainty: of the numbers that the law knows.
+            torques: largest torque of the mission by torque column, N m or N.
+            criterion: what counts.
+
+        Raises:
+            InputError: it cannot be flown.
+        """
+        self.nominal = Nominal(scenario)
+        self.law = self.nominal.resolved.law
+        self._torques, self._criterion = torques, criterion
+        self._variations = [self._variation(corner) for corner in uncertainty.corners]
+
+    def fly(self, points: Sequence[GainPoint]) -> list[Score]:
+        """Fly the trials of several gain sets in lanes, and score each."""
+        flights = [
+            self._flight(variation, point) for point in points for variation in self._variations
+        ]
+        logs: list[tuple[FlightLog, float]] = [None] * len(flights)  # type: ignore[list-item]
+        for group in batches(enumerate(flights)):
+            if len(group) == 1:
+                number, flight = group[0]
+                logs[number] = alone(flight)
+                continue
+            for flown in FlightBatch([flight for _, flight in group]).fly():
+                number, flight = group[flown.flight]
+                share = 1.0 if flown.ending.error is None else flown.log.ticks / flight.ticks
+                logs[number] = flown.log, share
+        count = len(self._variations)
+        return [
+            self._score([self._measured(*log) for log in logs[k : k + count]])
+            for k in range(0, len(logs), count)
+        ]
+
+    def _variation(self, corner: Corner) -> Variation:
+        tree, changed = self.nominal.tree, dict[Path, Any]()
+        robot = tree["robot"]
+        bodies = [("base",), *(("links", name) for name in robot["links"])]
+        for body in bodies:
+            for number in ("mass", "inertia"):
+                path = ("robot", *body, number)
+                changed[path] = corner.mass * value_at(tree, path)
+        for kind in ("coulomb", "viscous"):
+            paths = [
+                ("plant", "friction", kind),
+                *(("robot", "joints", name, "friction", kind) for name in robot["joints"]),
+            ]
+            for path in paths:
+                value = value_at(tree, path)
+                if not isinstance(value, Unavailable):
+                    changed[path] = corner.friction * value
+        latency = ("plant", "command_latency_ticks")
+        changed[latency] = value_at(tree, latency) + corner.latency_ticks
+        changed["faults", "torque_scale@0:all={}"] = corner.torque_scale
+        return self.nominal.variation(changed, self.nominal.scenario.seed)
+
+    def _flight(self, variation: Variation, point: GainPoint) -> Flight:
+        gains = {name: values.tolist() for name, values in point.gains.items()}
+        parameters = merge(variation.parameters, {"controller": {self.law.name: gains}})
+        flight = self.nominal.flight_of(variation._replace(parameters=parameters))
+        settings = flight.scenario.controller
+        if settings.acceleration_filter_hz == point.corner_hz:
+            return flight
+        controller = settings.model_copy(update={"acceleration_filter_hz": point.corner_hz})
+        return Flight(replace(flight.scenario, controller=controller))
+
+    def _measured(self, log: FlightLog, flown: float) -> dict[str, float]:
+        return {"flown": flown, **(self._criterion.of(log) if flown >= 1.0 else {})}
+
+    def _score(self, trials: Sequence[Metrics]) -> Score:
+        flown = float(np.mean([trial["flown"] for trial in trials]))
+        if flown < 1.0:
+            return Score(math.inf, math.inf, 0.0, flown, False, {})
+        mean = {
+            name: math.sqrt(float(np.mean([trial.get(name, 0.0) ** 2 for trial in trials])))
+            for name in trials[0]
+        }
+        return Score(
+            self._criterion.error(mean),
+            max(mean[f"{name}.ripple"] / most for name, most in self._torques.items()),
+            mean.get("wheels.saturation", 0.0),
+            1.0,
+            any(value for name, value in mean.items() if name.endswith(".beyond_effort")),
+            mean,
+        )
+
+
+def alone(flight: Flight) -> tuple[FlightLog, float]:
+    """Fly a flight by itself; return its log and the share of it that was flown."""
+    try:
+        return simulate(flight), 1.0
+    except FlightError as error:
+        if error.log is None:
+            raise
+        return error.log, error.log.ticks / flight.ticks

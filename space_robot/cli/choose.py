@@ -1,0 +1,146 @@
+"""The command ``space-robot choose``: which law to fly, with its evidence."""
+
+from __future__ import annotations
+
+import shlex
+from pathlib import Path
+from typing import Any
+
+import click
+
+from .completed_names import names_in
+from .gains import WORDS, TypedCommand
+from .numbers import FiniteRange
+from .options import flight_options, folder_option
+
+SECTION = "Gains and studies"
+
+
+@click.command(cls=TypedCommand)
+@click.argument("robot", default="paper", shell_complete=names_in("robots"))
+@flight_options(
+    *("mission", "case", "sensors", "navigation", "actuators", "orbit", "duration", "period"),
+    *("friction", "set", "json"),
+)
+@click.option(
+    "--for",
+    "criterion",
+    type=click.Choice(["tracking", "pointing", "tool", "wheels"]),
+    default="tracking",
+    show_default=True,
+    help="What counts: errors of attitude and joints, the attitude's, the tool's, or least wear of "
+    "the wheels with errors near the least.",
+)
+@click.option(
+    "--ripple",
+    type=FiniteRange(0.0, 10.0, min_open=True),
+    default=0.05,
+    show_default=True,
+    help="Largest ripple of a torque, RMS above 2 Hz, as a share of the largest that the mission "
+    "asks.",
+)
+@click.option(
+    "--law",
+    "laws",
+    multiple=True,
+    metavar="LAW",
+    help="A law that takes part, also file.py:Class=GAINS of your own; may be repeated [default: "
+    "all].",
+)
+@click.option(
+    "--evaluations",
+    type=click.IntRange(1, 100_000),
+    default=240,
+    show_default=True,
+    help="Gain sets to try for each law.",
+)
+@click.option(
+    "--runs",
+    type=click.IntRange(2, 100_000),
+    default=24,
+    show_default=True,
+    help="Draws that every law flies with its best gains.",
+)
+@click.option("--seed", type=click.IntRange(0), default=1, show_default=True, help="Of all draws.")
+@click.option(
+    "--mass-uncertainty",
+    type=FiniteRange(0.0, 0.9),
+    default=0.2,
+    show_default=True,
+    help="Share by which each mass and inertia may be wrong.",
+)
+@click.option("--workers", type=click.IntRange(1), help="Processes [default: as many as cores].")
+@folder_option("--out", help="Folder to write [default: ROBOT/choice, choices/ROBOT if shipped].")
+@click.pass_context
+def choose(
+    context: click.Context,
+    /,
+    robot: str,
+    as_json: bool,
+    criterion: str,
+    laws: tuple[str, ...],
+    mass_uncertainty: float,
+    workers: int | None,
+    out: Path | None,
+    **options: Any,
+) -> None:
+    """Find the law and the gains that fly a robot best.
+
+    For each law the gains with the least error at each ripple of the torques are searched, over
+    trials with a light and a heavy robot (masses, torque scale, friction, latency); then each law
+    flies the mission with its best gains, all with the same draws. The folder has a page with the
+    fronts, the gains of each law, JSON, and a campaign that goes on with the best. A robot of your
+    own flies the law found, with its gains, from then on. Ten minutes for a robot with seven joints
+    on two cores; --evaluations and --runs make it shorter.
+
+    \b
+    Examples:
+      space-robot choose my_robot/ --sensors fine --navigation filtered --actuators small_wheels
+      space-robot choose ets_vii --orbit ets_vii --for pointing
+      space-robot choose paper --case 3 --law tde_stc --law indi --evaluations 60
+      space-robot choose my_robot/ --law my_law.py:MyLaw=my_law.yaml --law ctc
+    """
+    from space_robot_model.robot.find import robot_as_path, robot_files
+
+    from ..choice import ChoiceOptions, Uncertainty
+    from ..choice import choose as find_law
+    from ..choice.report import CAMPAIGN, candidates_table, report, write_report
+    from ..console.progress import counting_progress
+    from ..console.terminal import echo_json, terminal
+    from ..console.terminal_tables import print_table
+    from ..flight.batch.compilation import compile_lanes
+    from ..processes.executor import cores
+
+    wanted = ChoiceOptions(
+        criterion=criterion,
+        ripple=options.pop("ripple"),
+        laws=laws,
+        evaluations=options.pop("evaluations"),
+        runs=options.pop("runs"),
+        seed=options.pop("seed"),
+        workers=workers or cores(),
+        uncertainty=Uncertainty(mass=mass_uncertainty),
+    )
+    scenario = {"robot": robot_as_path(robot)} | {
+        name: value for name, value in options.items() if value not in (None, {}, "")
+    }
+    files = robot_files(scenario["robot"])
+    is_own = files.gains is not None and "/" in scenario["robot"]
+    folder = out or (
+        Path(robot) / "choice" if is_own and Path(robot).is_dir() else Path("choices") / files.name
+    )
+    command = shlex.join(["space-robot", "choose", *context.meta[WORDS]])
+    compile_lanes()
+    choice, _ = find_law(scenario, folder, wanted, command, counting_progress)
+    page = write_report(choice, folder, command)
+    chosen = choice.install(folder, files.gains) if is_own and files.gains and choice.law else None
+    if as_json:
+        echo_json(report(choice))
+    else:
+        print_table(candidates_table(choice), terminal())
+        click.echo(choice.sentence)
+    if chosen:
+        click.echo(f"{robot} flies {choice.law} with gains {chosen} from now on", err=True)
+    elif choice.law:
+        click.echo(f"to fly it: --controller {choice.law} --gains {folder / choice.law}/", err=True)
+    click.echo(f"{page} has the fronts; {folder / CAMPAIGN} goes on with the best laws", err=True)
