@@ -15,7 +15,7 @@ from ..analysis.words import limit_cycles
 from ..campaign.draws import Draws
 from ..campaign.study import Study
 from ..campaign.verdicts.laws import PairedComparison, compare
-from ..flight.batch.batch import FlightBatch, batches
+from ..flight.batch import FlightBatch, batches
 from ..processes.executor import run_all
 from .criteria import CRITERIA, Criterion, Metrics, is_error
 from .search_space import GainPoint
@@ -176,7 +176,7 @@ def _fly(text: str, seed: int, runs: int, criterion: str, task: Task) -> list[di
 
 @lru_cache(maxsize=2)
 def _draws(text: str, seed: int, runs: int) -> Draws:
-    return Draws(Study.model_validate_json(text), seed, runs, check=False)
+    return Draws(Study.model_validate_json(text), seed, runs)
 
 
 def _of(metrics: Mapping[str, float], end: str) -> dict[str, float]:

@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 
 from ..analysis.figures.figure_set import SavedFigure
 from ..analysis.figures.style import COLOURS, house_style, page, save_figure
-from ..analysis.page import template
+from ..analysis.report import template
 from ..console.files import make_folder, write_text
 from ..console.tables import Column, Group, JudgedCell, Table
 from ..console.terminal import json_text

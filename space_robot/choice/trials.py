@@ -22,7 +22,7 @@ from space_robot_msgs_py.errors import FlightError
 from ..api import Scenario
 from ..campaign.draws.nominal import Nominal, Variation
 from ..campaign.draws.paths import Path, Unavailable, value_at
-from ..flight.batch.batch import FlightBatch, batches
+from ..flight.batch import FlightBatch, batches
 from ..flight.plan import Flight
 from ..flight.simulate import simulate
 from .criteria import Criterion, Metrics
@@ -179,7 +179,7 @@ class Trials:
     def _flight(self, variation: Variation, point: GainPoint) -> Flight:
         gains = {name: values.tolist() for name, values in point.gains.items()}
         parameters = merge(variation.parameters, {"controller": {self.law.name: gains}})
-        flight = self.nominal.flight_of(variation._replace(parameters=parameters))
+        flight = self.nominal.flight_with(variation._replace(parameters=parameters))
         settings = flight.scenario.controller
         if settings.acceleration_filter_hz == point.corner_hz:
             return flight

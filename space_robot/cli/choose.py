@@ -108,7 +108,7 @@ def choose(
     from ..console.progress import counting_progress
     from ..console.terminal import echo_json, terminal
     from ..console.terminal_tables import print_table
-    from ..flight.batch.compilation import compile_lanes
+    from ..flight.compilation import compile_lanes
     from ..processes.executor import cores
 
     wanted = ChoiceOptions(

@@ -212,7 +212,7 @@ def new_robot(
     from ..console.progress import counting_progress
     from ..console.terminal import echo_json, terminal
     from ..console.terminal_tables import print_table
-    from ..flight.batch.compilation import compile_lanes
+    from ..flight.compilation import compile_lanes
     from ..processes.executor import cores
 
     if base_inertia:

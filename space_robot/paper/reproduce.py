@@ -13,13 +13,13 @@ from typing import Any, NamedTuple
 
 from matplotlib.figure import Figure
 
-from ..analysis.report import template
 from space_robot_msgs_py.config.installation import config_directory
 from space_robot_msgs_py.errors import InputError
 
 from ..analysis import figures as drawn
 from ..analysis.figures.base_torque import BaseTorque
 from ..analysis.figures.figure_set import FigureFolder, SavedFigure
+from ..analysis.report import template
 from ..console.files import csv_writer
 from ..console.tables import Column, JudgedCell, Table, as_markdown
 from ..flight.flown_log import empty_log

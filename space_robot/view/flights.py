@@ -13,7 +13,6 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..analysis.report import template
 from space_robot_model.robot import Robot
 from space_robot_model.robot.find import find_robot, robot_as_path
 from space_robot_model.robot.parts import Spring
@@ -26,8 +25,8 @@ from space_robot_sim.faults.grammar import parse_fault
 
 from ..analysis.analysed_log import AnalysedLog
 from ..analysis.described import check_joints, events_of, robot_of
-from ..analysis.page import template
 from ..analysis.plotted import PlottedQuantity, quantities_of
+from ..analysis.report import template
 from ..scenario.faults import KINDS
 from .actuators import actuator_notes
 from .animation import ShownFlight, animate
