@@ -16,8 +16,7 @@ from ..campaign.verdicts.laws import quantile
 from ..campaign.verdicts.rows import has_values, is_complete, law_rows, laws_in, penalised
 from ..console.tables import Column, Table
 from ..console.tables import JudgedCell as Judged
-from ..console.terminal import say
-from ..console.terminal_tables import print_table
+from ..console.terminal import print_table, say
 
 if TYPE_CHECKING:
     from pandas import DataFrame

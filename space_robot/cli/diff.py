@@ -9,8 +9,6 @@ import click
 
 from .options import flight_option
 
-SECTION = "Results"
-
 LONGEST = 60
 """Maximum characters of a value on a terminal; --json shows all."""
 
@@ -33,8 +31,7 @@ def diff(first: Path, second: Path, as_json: bool) -> None:
     from rich.console import Console
 
     from ..console.tables import Column, Table
-    from ..console.terminal import echo_json, say
-    from ..console.terminal_tables import print_table
+    from ..console.terminal import echo_json, print_table, say
     from ..scenario.comparison import differences
 
     changes = list(differences(_resolved(first), _resolved(second)))

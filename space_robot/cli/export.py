@@ -11,9 +11,7 @@ import click
 from .options import flight_options, plan_flight
 
 if TYPE_CHECKING:
-    from ..export.verify import ReplayVerdict
-
-SECTION = "Flight code"
+    from ..export.folder import ReplayVerdict
 
 
 @click.command()
@@ -90,10 +88,9 @@ def export(
 
     from ..console.progress import counting_progress
     from ..console.terminal import echo_json
-    from ..export.folder import check_folder, write_folder, write_readme
+    from ..export.folder import check_folder, verify, write_folder, write_readme
     from ..export.software import export as export_software
     from ..export.software import recorded_flights
-    from ..export.verify import verify
     from ..flight.compilation import compile_kernels
     from ..scenario.scenario import Scenario
 
@@ -131,8 +128,7 @@ def _print_export(
     folder: Path, figures: Mapping[str, Any], flights: Sequence[tuple[str, str, int]]
 ) -> None:
     from ..console.tables import Column, Table
-    from ..console.terminal import say, terminal
-    from ..console.terminal_tables import print_table
+    from ..console.terminal import print_table, say, terminal
 
     console = terminal()
     say(
@@ -153,8 +149,7 @@ def _print_verdicts(verdicts: Sequence[ReplayVerdict]) -> None:
     if not verdicts:
         return
     from ..console.tables import Column, JudgedCell, Table
-    from ..console.terminal import terminal
-    from ..console.terminal_tables import print_table
+    from ..console.terminal import print_table, terminal
 
     columns = (
         Column("target", is_label=True),

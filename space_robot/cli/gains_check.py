@@ -17,8 +17,7 @@ from space_robot_msgs_py.config.validation import validate
 from space_robot_msgs_py.errors import FlightError, InputError
 
 from ..console.tables import Column, Group, JudgedCell, Table
-from ..console.terminal import say
-from ..console.terminal_tables import print_table
+from ..console.terminal import print_table, say
 from ..flight.plan import Flight, Scenario, resolve
 from ..flight.simulate import simulate
 from ..scenario.node_settings import FlightSettings

@@ -12,14 +12,11 @@ import click
 from click.shell_completion import CompletionItem
 
 from . import new_files
-from .completed_names import names_in
-from .numbers import NumberList
+from .option_types import NumberList, names_in
 from .options import BASE, REPAIR, flight_options
 
 if TYPE_CHECKING:
     from space_robot_model.robot.urdf import Mount
-
-SECTION = "Robots, missions and own pieces"
 
 
 class NewGroup(click.Group):
@@ -199,8 +196,7 @@ def new_robot(
     from ..campaign.new_robot import check_replaceable, make_robot, robot_texts
     from ..campaign.new_robot.display import rms_table
     from ..campaign.new_robot.texts import CAMPAIGN_FILE
-    from ..console.terminal import echo_json, terminal
-    from ..console.terminal_tables import print_table
+    from ..console.terminal import echo_json, print_table, terminal
     from ..flight.compilation import compile_kernels
 
     if base_inertia:

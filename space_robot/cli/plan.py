@@ -8,11 +8,8 @@ from typing import Any
 
 import click
 
-from .completed_names import names_in
-from .numbers import FiniteRange
-from .options import NameOrNumbers, file_option, flight_options, resolve_options
-
-SECTION = "Robots, missions and own pieces"
+from .option_types import FiniteRange, NameOrNumbers, names_in
+from .options import file_option, flight_options, resolve_options
 
 
 @click.command()
@@ -124,8 +121,7 @@ MANY = 1e3
 
 def _print_plan(report: Mapping[str, Any]) -> None:
     from ..console.tables import Column, JudgedCell, Table
-    from ..console.terminal import say, terminal
-    from ..console.terminal_tables import print_table
+    from ..console.terminal import print_table, say, terminal
 
     console = terminal()
     segments: list[tuple[Column, Callable[[Mapping[str, Any]], Any]]] = [

@@ -1,6 +1,6 @@
 """Data model of all tables, and their text as Markdown.
 
-`terminal_tables.print_table` prints it on a terminal, ``templates/table.html.j2`` in a page.
+`terminal.print_table` prints it on a terminal, ``templates/table.html.j2`` in a page.
 """
 
 from __future__ import annotations
@@ -27,6 +27,11 @@ class Column(NamedTuple):
     def heading(self) -> str:
         """Name and unit."""
         return f"{self.name}, {self.unit}" if self.unit else self.name
+
+
+def label(name: str = "") -> Column:
+    """Return a column of texts."""
+    return Column(name, is_label=True)
 
 
 class JudgedCell(NamedTuple):

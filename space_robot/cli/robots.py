@@ -1,4 +1,4 @@
-"""The command ``space-robot robot``: show the model read from a robot's file."""
+"""The commands ``space-robot robot`` and ``urdf``: a robot's model shown, and as a URDF."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from .completed_names import names_in
+from .option_types import names_in
 from .options import BASE, REPAIR, file_option, flight_options
 
 if TYPE_CHECKING:
@@ -19,8 +19,6 @@ if TYPE_CHECKING:
     from space_robot_model.robot.urdf_xml import Finding
 
     from ..console.tables import Table
-
-SECTION = "Robots, missions and own pieces"
 
 
 @click.command()
@@ -55,8 +53,7 @@ def robot(robot: str, base: str | None, repair: bool, out: Path | None, as_json:
     from space_robot_msgs_py.errors import InputError
 
     from ..console.files import write_text
-    from ..console.terminal import echo_json, terminal
-    from ..console.terminal_tables import print_table
+    from ..console.terminal import echo_json, print_table, terminal
 
     _, own_base, is_repaired = split_choice(robot)
     base, repair = base or own_base, repair or is_repaired
@@ -83,11 +80,44 @@ def robot(robot: str, base: str | None, repair: bool, out: Path | None, as_json:
         _print_robot(description, findings, terminal())
 
 
+@click.command()
+@click.argument("robot", default="paper", shell_complete=names_in("robots"))
+@BASE
+@REPAIR
+@file_option("--out", help="Write it to a file, in place of standard output.")
+def urdf(robot: str, base: str | None, repair: bool, out: Path | None) -> None:
+    """Export a robot as a URDF, for RViz, Pinocchio, MuJoCo and other tools.
+
+    ROBOT is a name, a URDF, a xacro (where xacro is installed), a YAML file or a folder. Frames
+    are those of /tf: the base's is at its centre of mass, those of joints have the axis as z. What
+    has no shapes gets some that are drawn from its joints and masses.
+
+    \b
+    Examples:
+      space-robot urdf paper --out paper.urdf
+      space-robot urdf my_robot/ --out my_robot.urdf
+      space-robot urdf published.urdf --repair --base satellite --out mended.urdf
+    """
+    from space_robot_model.robot.find import robot_as_path, robot_source
+    from space_robot_model.robot.urdf_text import urdf_text
+
+    from ..console.files import write_text
+
+    source = robot_source(robot_as_path(robot), base, repair)
+    for line in source.findings:
+        click.echo(f"repaired: {line}", err=True)
+    text = urdf_text(source.robot)
+    if out is None:
+        click.echo(text, nl=False)
+        return
+    write_text(text, out, replace=True)
+    click.echo(f"wrote {out}", err=True)
+
+
 def _print_robot(
     description: dict[str, Any], findings: Sequence[Finding], console: Console
 ) -> None:
-    from ..console.terminal import say
-    from ..console.terminal_tables import print_table
+    from ..console.terminal import print_table, say
 
     passive = len(description["passive_names"])
     say(

@@ -155,7 +155,7 @@ def _version(package: str) -> str | None:
 def check_flights() -> CheckedItem:
     """Import what flights in one process need, and resolve the default flight without flying it."""
     try:
-        from ..flight.plan import Scenario, resolve
+        from .flight.plan import Scenario, resolve
 
         plan = resolve(Scenario()).options
     except Exception as error:  # whatever fails here would end a flight
@@ -170,7 +170,7 @@ def check_kernels() -> CheckedItem:
     """Check the folder of compiled kernels, and if those of this version are there."""
     from space_robot_msgs_py.compiled.cache import cache_directory
 
-    from ..flight.compilation import MARK, mark_file
+    from .flight.compilation import MARK, mark_file
 
     folder, is_compiled = cache_directory(), mark_file(MARK).exists()
     values = {"folder": str(folder), "is_compiled": is_compiled}
@@ -299,7 +299,7 @@ def check_ros() -> Iterator[CheckedItem]:
 
 def check_distribution(file: str, environment: Mapping[str, str]) -> CheckedItem:
     """Check which ROS 2 the rclpy of a file belongs to, by ``ROS_DISTRO`` of ``setup.bash``."""
-    from ..flight.graph.processes import has_ros2_run
+    from .flight.graph.processes import has_ros2_run
 
     wheel = _version(WHEEL)
     distribution = environment.get("ROS_DISTRO") or (DISTRIBUTION if wheel else "unknown")
@@ -340,7 +340,7 @@ def check_domain(number: int | None = None) -> CheckedItem:
     Args:
         number: a domain; None: ``ROS_DOMAIN_ID``, or a free one.
     """
-    from ..flight.graph.domain import domain_asked_for, is_quiet, ros_domain
+    from .flight.graph.domain import domain_asked_for, is_quiet, ros_domain
 
     asked = domain_asked_for(number)
     try:
@@ -362,7 +362,7 @@ def check_tools(search_path: str | None = None) -> Iterator[CheckedItem]:
     Args:
         search_path: folders separated by colons; None: ``PATH``.
     """
-    from ..export.verify import CROSS, EMULATORS
+    from .export.folder import CROSS, EMULATORS
 
     yield _check_compilers(search_path)
     for processor, compiler in CROSS.items():
