@@ -107,11 +107,7 @@ def check_python(python: tuple[int, int] = sys.version_info[:2]) -> CheckedItem:
 
 
 def check_packages(required: Mapping[str, list[str]]) -> Iterator[CheckedItem]:
-    """Check the required packages, and the extras one by one.
-
-    Args:
-        required: requirements of each extra; those without an extra under "".
-    """
+    """Check the packages required by each extra, and without one (key "")."""
     packages = required.get("", [])
     versions, lacking = _installed(packages)
     if not packages:
@@ -153,7 +149,7 @@ def _version(package: str) -> str | None:
 
 
 def check_flights() -> CheckedItem:
-    """Import what flights in one process need, and resolve the default flight without flying it."""
+    """Resolve the default flight without flying it."""
     try:
         from .flight.plan import Scenario, resolve
 
@@ -261,10 +257,7 @@ def measure_lateness() -> dict[str, Any]:
 
 
 def check_deadlines(lateness: Mapping[str, Any]) -> CheckedItem:
-    """Judge a measurement: can a flight with ``--realtime`` keep this period here?
-
-    It can if 99 % of the ticks end within a period of their deadline, and no time is lost.
-    """
+    """Judge a measurement: 99 % of the ticks must end within a period of their deadline."""
     period = lateness["period_s"]
     names = {"median_s": "median", "percentile_99_s": "99 %", "worst_s": "worst"}
     numbers = ", ".join(f"{1e6 * lateness[key]:.0f} us ({name})" for key, name in names.items())
@@ -335,11 +328,7 @@ def check_middleware(identifier: str, environment: Mapping[str, str]) -> Checked
 
 
 def check_domain(number: int | None = None) -> CheckedItem:
-    """Check the ROS domain that a flight would take now; it is taken and released.
-
-    Args:
-        number: a domain; None: ``ROS_DOMAIN_ID``, or a free one.
-    """
+    """Take and release a ROS domain, as a flight does; None: ``ROS_DOMAIN_ID``, or a free one."""
     from .flight.graph.domain import domain_asked_for, is_quiet, ros_domain
 
     asked = domain_asked_for(number)
@@ -357,11 +346,7 @@ def check_domain(number: int | None = None) -> CheckedItem:
 
 
 def check_tools(search_path: str | None = None) -> Iterator[CheckedItem]:
-    """Check the compilers of flight code, the cross compilers with emulators, and the browser.
-
-    Args:
-        search_path: folders separated by colons; None: ``PATH``.
-    """
+    """Check compilers, cross compilers with emulators, and browser; None: those of ``PATH``."""
     from .export.folder import CROSS, EMULATORS
 
     yield _check_compilers(search_path)

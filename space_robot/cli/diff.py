@@ -30,7 +30,7 @@ def diff(first: Path, second: Path, as_json: bool) -> None:
     """
     from rich.console import Console
 
-    from ..console.tables import Column, Table
+    from ..console.tables import Column, Table, named
     from ..console.terminal import echo_json, print_table, say
     from ..scenario.comparison import differences
 
@@ -40,7 +40,7 @@ def diff(first: Path, second: Path, as_json: bool) -> None:
     elif not changes:
         say(Console(), "the same numbers")
     else:
-        columns = (Column("key", is_label=True), Column(first.name), Column(second.name))
+        columns = (named("key"), Column(first.name), Column(second.name))
         rows = [(d.key, _short(d.first), _short(d.second)) for d in changes]
         print_table(Table.of("", columns, rows), Console())
     if changes:

@@ -13,7 +13,7 @@ from space_robot_msgs_py.bag.law_history import in_words
 
 from ..analysis.words import flown as words_of
 from ..console.files import csv_rows, csv_writer
-from ..console.tables import Column, Table, label
+from ..console.tables import Column, Table, named
 from ..console.terminal import print_table, say
 
 if TYPE_CHECKING:
@@ -38,7 +38,7 @@ MOST_STRETCHES = 10
 def print_replay(report: dict[str, Any], console: Console) -> None:
     """Print the report of `run.Replay`."""
     say(console, title(report))
-    print_table(Table.of("", (label(), Column()), counts(report)), console)
+    print_table(Table.of("", (named(), Column()), counts(report)), console)
     for text in filter(None, (report["unfinished"], *report["damage"])):
         say(console, text)
     if not report["whole"] and len(report["stretches"]) > 1:
@@ -117,7 +117,7 @@ def _print_stretches(stretches: list[dict[str, Any]], console: Console) -> None:
 
 def _print_first(first: dict[str, Any], console: Console) -> None:
     title = f"first difference: tick {first['tick']}, t = {first['time_s']:.4f} s"
-    columns = label("field"), Column("recorded"), Column("replayed"), Column("by", spec=".3g")
+    columns = (named("field"), Column("recorded"), Column("replayed"), Column("by", spec=".3g"))
     rows = []
     for field in first["fields"]:
         by = "" if field["difference"] is None else field["difference"]
@@ -127,7 +127,7 @@ def _print_first(first: dict[str, Any], console: Console) -> None:
 
 def _print_axes(report: dict[str, Any], console: Console) -> None:
     names = ("RMS recorded", "RMS replayed", "RMS of difference", "largest difference")
-    columns = label("axis"), *(Column(name, spec=".4g") for name in names)
+    columns = named("axis"), *(Column(name, spec=".4g") for name in names)
     rows = []
     for axis, values in report["axes"].items():
         unit, *numbers = values.values()

@@ -29,8 +29,8 @@ class Column(NamedTuple):
         return f"{self.name}, {self.unit}" if self.unit else self.name
 
 
-def label(name: str = "") -> Column:
-    """Return a column of texts."""
+def named(name: str = "") -> Column:
+    """Return a column of names or other texts."""
     return Column(name, is_label=True)
 
 
@@ -42,6 +42,11 @@ class JudgedCell(NamedTuple):
     word: str
     tone: str
     """``good``, ``bad`` or ``open``."""
+
+    @classmethod
+    def of(cls, is_good: bool, good: str, bad: str, text: str = "") -> JudgedCell:
+        """Return a cell with one of two verdicts."""
+        return cls(text, good, "good") if is_good else cls(text, bad, "bad")
 
     def __str__(self) -> str:
         """Return text and verdict."""
@@ -73,9 +78,9 @@ class Table:
     """Sentences below the table."""
 
     @classmethod
-    def of(cls, title: str, columns: Sequence[Column], rows: Sequence[Row]) -> Table:
+    def of(cls, title: str, columns: Sequence[Column], rows: Sequence[Row], *notes: str) -> Table:
         """Return a table with one group without name."""
-        return cls(title, columns, [Group(rows)])
+        return cls(title, columns, [Group(rows)], notes)
 
     def texts(self, group: Group) -> Iterator[list[str]]:
         """Yield each row of a group as texts."""
