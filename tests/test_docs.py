@@ -90,7 +90,7 @@ def test_the_comparison_has_the_figures_of_the_measurements() -> None:
 @pytest.mark.parametrize("document", DOCUMENTS, ids=lambda p: p.name)
 def test_commands_and_options_exist(document: Path) -> None:
     for name, *words in map(str.split, COMMAND.findall(document.read_text("utf-8"))):
-        command = cli.commands.get(name)
+        command = cli.get_command(click.Context(cli), name)
         assert command is not None, f"space-robot {name}"
         if isinstance(command, click.Group) and words:
             command = command.get_command(click.Context(command), words[0])

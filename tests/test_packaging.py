@@ -18,7 +18,7 @@ from import_graph import PACKAGES, modules
 from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
-from space_robot.cli.main import cli
+from space_robot.cli.main import COMMANDS
 from space_robot.processes import MODULES
 from space_robot_msgs_py import topics
 
@@ -197,7 +197,7 @@ def test_package_xml_has_what_launch_files_import_and_tests_need() -> None:
 
 def test_there_is_one_executable_for_each_command_and_node() -> None:
     names = {path.name for path in EXECUTABLES}
-    assert names == {*cli.commands, *(f"{node}_node" for node in MODULES)}
+    assert names == {*COMMANDS, *(f"{node}_node" for node in MODULES)}
     assert len({path.read_text("utf-8") for path in EXECUTABLES}) == 1
     assert all(os.access(path, os.X_OK) for path in EXECUTABLES)
 

@@ -69,8 +69,8 @@ def _help(command: click.Command, context: click.Context, level: int) -> Iterato
     yield f"```text\n{command.get_help(context)}\n```"
     if isinstance(command, click.Group):
         for name in command.list_commands(context):
-            inner = command.commands[name]
-            if not inner.hidden:
+            inner = command.get_command(context, name)
+            if inner and not inner.hidden:
                 yield from _help(inner, click.Context(inner, context, name), level + 1)
 
 

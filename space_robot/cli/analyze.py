@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -12,15 +12,13 @@ import click
 
 from space_robot_msgs_py.config.text import printable
 
-from .options import NAMESPACE, REMAP, TRUST, file_option, folder_option
+from .options import excerpt_options, file_option, folder_option
 
 if TYPE_CHECKING:
     from space_robot_msgs_py.bag.flight_log import FlightLog
 
     from ..analysis.own_metric import OwnMetric
     from ..analysis.sizing import ActuatorSet
-
-SECTION = "Results"
 
 
 @click.command()
@@ -66,11 +64,7 @@ SECTION = "Results"
     metavar="S",
     help="Window over which the base's jitter counts, s (default: 1).",
 )
-@click.option("--from", "from_s", type=float, metavar="T", help="Begin at T simulated seconds.")
-@click.option("--to", "to_s", type=float, metavar="T", help="End before T simulated seconds.")
-@REMAP
-@NAMESPACE
-@TRUST
+@excerpt_options
 @click.option(
     "--json", "as_json", is_flag=True, help="Print the report as JSON: a list of several."
 )
@@ -84,11 +78,7 @@ def analyze(
     actuators: str | None,
     band_deg: float | None,
     window_s: float | None,
-    from_s: float | None,
-    to_s: float | None,
-    remap: dict[str, str],
-    namespace: str | None,
-    trust: bool,
+    read: Callable[[Path], FlightLog],
     as_json: bool,
 ) -> None:
     """Metrics of recorded flights: one bag, or several side by side.
@@ -109,9 +99,7 @@ def analyze(
       space-robot analyze theirs --remap /arm/joint_states:=/joint_states
       space-robot analyze both --namespace /sat1
     """
-    from space_robot_msgs_py.bag.reader import read_flight
-
-    from ..analysis import analyze, excerpt
+    from ..analysis import analyze
     from ..analysis.analysed_log import PointingBudget
     from ..analysis.export import check_parquet, write_csv, write_parquet
     from ..console.files import check_free, write_text
@@ -140,7 +128,7 @@ def analyze(
     reports: dict[str, dict[str, Any]] = {}
     descriptions: dict[str, dict[str, Any]] = {}
     for name, bag in zip(names, bags, strict=True):
-        log = excerpt(read_flight(bag, remap, trust, namespace), from_s, to_s)
+        log = read(bag)
         reports[name] = analyze(log, _actuator_set(log, actuators), budget)
         descriptions[name] = log.flight
         if own:
@@ -212,7 +200,7 @@ def _print(reports: dict[str, dict[str, Any]], as_json: bool) -> None:
         echo_json(reports_shown[0] if len(reports_shown) == 1 else reports_shown)
         return
     from ..analysis.report_tables import metrics_table, rms_table, sizing_table
-    from ..console.terminal_tables import print_table
+    from ..console.terminal import print_table
     from .report_display import print_comparison
 
     console = terminal()

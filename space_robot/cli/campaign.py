@@ -3,19 +3,15 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from .campaign_report import report
-from .completed_names import names_in
-from .numbers import FiniteRange
-from .options import folder_option
+from .option_types import FiniteRange, names_in
+from .options import file_option, flight_option, folder_option
 
 if TYPE_CHECKING:
     from ..campaign.flown.flights import Progress
-
-SECTION = "Gains and studies"
 
 
 @click.group()
@@ -30,7 +26,7 @@ def campaign() -> None:
     """
 
 
-campaign.add_command(report)
+FOLDER = click.argument("folder", type=click.Path(path_type=Path), metavar="DIR")
 
 
 @campaign.command()
@@ -66,17 +62,8 @@ campaign.add_command(report)
     help="Longest wall-clock time of a flight; its row says out_of_time then. Flights with a limit "
     "are flown one by one [default: any].",
 )
-@click.option("--json", "as_json", is_flag=True, help="Print outcomes and verdicts as JSON.")
-def run(
-    file: str,
-    runs: int | None,
-    seed: int,
-    out: Path | None,
-    workers: int | None,
-    scheduler: str | None,
-    timeout_s: float | None,
-    as_json: bool,
-) -> None:
+@flight_option("json")
+def run(file: str, out: Path | None, as_json: bool, **options: Any) -> None:
     """Fly a campaign into a folder; the same command resumes an interrupted one.
 
     FILE is a YAML file, or a name of config/campaigns; docs/manual/campaigns.md has its format.
@@ -108,12 +95,8 @@ def run(
                 show(progress.done, progress.total, failed)
 
             flown = Campaign.load(file).run(
-                runs,
-                seed,
-                folder,
-                workers,
-                scheduler,
-                timeout_s,
+                **options,
+                out=folder,
                 progress=show_progress,
                 warn=lambda text: click.echo(text, err=True),
             )
@@ -137,7 +120,7 @@ def name_of(file: Path) -> str:
 
 
 @campaign.command()
-@click.argument("folder", type=click.Path(path_type=Path), metavar="DIR")
+@FOLDER
 @click.argument("file", type=click.Path(path_type=Path), metavar="FILE")
 def export(folder: Path, file: Path) -> None:
     """Write the table of a campaign as Parquet or CSV, a row a flight.
@@ -157,16 +140,16 @@ def export(folder: Path, file: Path) -> None:
 
 
 @campaign.command()
-@click.argument("folder", type=click.Path(path_type=Path), metavar="DIR")
+@FOLDER
 @click.argument("run", type=click.IntRange(0), metavar="RUN")
 @click.option("--law", metavar="LAW", help="As the campaign's file has it [default: its first].")
-@click.option("--bag", type=click.Path(path_type=Path), help="Folder of the bag to write.")
+@flight_option("bag")
 @click.option(
     "--trust",
     is_flag=True,
     help="Import the module:Class and read the files that the campaign names: runs its code.",
 )
-@click.option("--json", "as_json", is_flag=True, help="Print the report as JSON.")
+@flight_option("json")
 def rerun(
     folder: Path, run: int, law: str | None, bag: Path | None, trust: bool, as_json: bool
 ) -> None:
@@ -206,3 +189,75 @@ def rerun(
     click.echo(flown.verdict, err=as_json or not flown.is_same)
     if not flown.is_same:
         raise click.exceptions.Exit(1)
+
+
+@campaign.command()
+@FOLDER
+@file_option("--html", help="One page with all tables and figures, to send to a colleague.")
+@file_option(
+    "--markdown", help="The tables as Markdown, and a figure of the same name as PNG and SVG."
+)
+@click.option(
+    "--metric",
+    "metrics",
+    multiple=True,
+    metavar="NAME",
+    help="Compare the laws by this metric, as attitude.max; repeatable [default: RMS errors, "
+    "the base's ripple, and what is required].",
+)
+@click.option(
+    "--study",
+    type=click.Path(path_type=Path),
+    metavar="FILE",
+    help="Judge by the requirements of this campaign's file [default: those that were flown].",
+)
+@flight_option("json")
+def report(
+    folder: Path,
+    html: Path | None,
+    markdown: Path | None,
+    metrics: tuple[str, ...],
+    study: Path | None,
+    as_json: bool,
+) -> None:
+    """Report a campaign: limits met, requirements, laws, influences, worst runs.
+
+    DIR is the folder of `campaign run`, finished or not. docs/manual/campaigns.md explains
+    the numbers. Damaged files are listed.
+
+    \b
+    Examples:
+      space-robot campaign report campaigns/a
+      space-robot campaign report campaigns/a --html a.html
+      space-robot campaign report campaigns/a --metric attitude.max --json
+      space-robot campaign report campaigns/a --study stricter.yaml
+    """
+    from ..analysis.figures.style import save_figure
+    from ..campaign.flown import FlownCampaign
+    from ..campaign.report import documents
+    from ..campaign.report.figures import summary_figure
+    from ..campaign.report.findings import Findings
+    from ..campaign.study import read_study
+    from ..console.files import check_free, write_text
+    from ..console.terminal import echo_json, terminal
+
+    for path in (html, markdown):
+        if path:
+            check_free(path)
+    judged_by = None if study is None else read_study(study)
+    findings = Findings.of(FlownCampaign.open(folder), judged_by, metrics)
+    for warning in findings.warnings:
+        click.echo(warning, err=True)
+    if html:
+        write_text(documents.render(findings), html)
+        click.echo(f"wrote {html}", err=True)
+    if markdown:
+        files = [markdown]
+        if figure := summary_figure(findings):
+            files += save_figure(figure, markdown.with_suffix(""))
+        write_text(documents.markdown(findings), markdown)
+        click.echo(f"wrote {', '.join(map(str, files))}", err=True)
+    if as_json:
+        echo_json(documents.record(findings))
+    else:
+        documents.print_report(findings, terminal())

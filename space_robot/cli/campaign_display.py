@@ -14,10 +14,8 @@ from ..campaign.report.findings import Findings
 from ..campaign.report.tables import TONES, number
 from ..campaign.verdicts.laws import quantile
 from ..campaign.verdicts.rows import has_values, is_complete, law_rows, laws_in, penalised
-from ..console.tables import Column, Table
-from ..console.tables import JudgedCell as Judged
-from ..console.terminal import say
-from ..console.terminal_tables import print_table
+from ..console.tables import Column, JudgedCell, Table, named
+from ..console.terminal import print_table, say
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -49,30 +47,20 @@ def print_summary(flown: FlownCampaign, console: Console) -> None:
     findings = Findings.of(flown)
     names = findings.names
     print_table(medians(flown.table, names, flown.seed, list(flown.study.metrics)), console)
-    if verdicts := findings.verdicts:
-        print_table(
-            Table.of(
-                "Requirements",
-                (
-                    Column("requirement", is_label=True),
-                    Column("law", is_label=True),
-                    Column("met in"),
-                    Column("at least", spec=".4f"),
-                    Column("verdict"),
-                ),
-                [
-                    [
-                        f"{v.requirement}, {v.point}" if v.point else v.requirement,
-                        names[v.law],
-                        f"{v.met} of {v.runs}",
-                        v.limits.low,
-                        Judged("", v.word, TONES[v.word]),
-                    ]
-                    for v in verdicts
-                ],
-            ),
-            console,
-        )
+    rows = [
+        [
+            f"{v.requirement}, {v.point}" if v.point else v.requirement,
+            names[v.law],
+            f"{v.met} of {v.runs}",
+            v.limits.low,
+            JudgedCell("", v.word, TONES[v.word]),
+        ]
+        for v in findings.verdicts
+    ]
+    if rows:
+        numbers = Column("met in"), Column("at least", spec=".4f"), Column("verdict")
+        columns = named("requirement"), named("law"), *numbers
+        print_table(Table.of("Requirements", columns, rows), console)
     say(console, shlex.join(["space-robot", "campaign", "report", str(flown.folder)]))
     # where no flight has a number all failed, and the first is as bad as any
     judged = findings.judged
@@ -99,5 +87,5 @@ def medians(table: DataFrame, names: dict[str, str], seed: int, own: Sequence[st
         own = law_rows(table, law)
         middle = (quantile(penalised(own, f"metric.{name}"), 0.5).value for name in shown)
         rows.append([names[law], f"{is_complete(own).sum()} of {len(own)}", *map(number, middle)])
-    columns = (Column("law", is_label=True), Column("complete"), *map(Column, shown))
+    columns = (named("law"), Column("complete"), *map(Column, shown))
     return Table.of(f"{table['run'].nunique()} runs, seed {seed}: medians", columns, rows)

@@ -8,12 +8,9 @@ from typing import Any
 
 import click
 
-from .completed_names import names_in
 from .gains import WORDS, TypedCommand
-from .numbers import FiniteRange
+from .option_types import FiniteRange, names_in
 from .options import flight_options, folder_option
-
-SECTION = "Gains and studies"
 
 
 @click.command(cls=TypedCommand)
@@ -106,8 +103,7 @@ def choose(
     from ..choice import choose as find_law
     from ..choice.report import CAMPAIGN, candidates_table, report, write_report
     from ..console.progress import counting_progress
-    from ..console.terminal import echo_json, terminal
-    from ..console.terminal_tables import print_table
+    from ..console.terminal import echo_json, print_table, terminal
     from ..flight.compilation import compile_lanes
     from ..processes.executor import cores
 

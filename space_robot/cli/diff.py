@@ -9,8 +9,6 @@ import click
 
 from .options import flight_option
 
-SECTION = "Results"
-
 LONGEST = 60
 """Maximum characters of a value on a terminal; --json shows all."""
 
@@ -32,9 +30,8 @@ def diff(first: Path, second: Path, as_json: bool) -> None:
     """
     from rich.console import Console
 
-    from ..console.tables import Column, Table
-    from ..console.terminal import echo_json, say
-    from ..console.terminal_tables import print_table
+    from ..console.tables import Column, Table, named
+    from ..console.terminal import echo_json, print_table, say
     from ..scenario.comparison import differences
 
     changes = list(differences(_resolved(first), _resolved(second)))
@@ -43,7 +40,7 @@ def diff(first: Path, second: Path, as_json: bool) -> None:
     elif not changes:
         say(Console(), "the same numbers")
     else:
-        columns = (Column("key", is_label=True), Column(first.name), Column(second.name))
+        columns = (named("key"), Column(first.name), Column(second.name))
         rows = [(d.key, _short(d.first), _short(d.second)) for d in changes]
         print_table(Table.of("", columns, rows), Console())
     if changes:

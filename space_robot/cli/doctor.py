@@ -11,10 +11,11 @@ from .options import flight_option
 if TYPE_CHECKING:
     from ..doctor import CheckedItem
 
-SECTION = "Begin"
-COLOURS = {"ok": "green", "warning": "yellow", "missing": "red"}
 WIDTH = 16
 """Characters of the longest name of a check."""
+
+
+COLOURS = {"ok": "green", "warning": "yellow", "missing": "red"}
 
 
 @click.command()

@@ -8,8 +8,6 @@ from pathlib import Path
 
 import click
 
-SECTION = "Begin"
-
 SUFFIXES = (".c", ".md", ".py", ".urdf")
 """Suffixes of an example's own files; others are made by running it."""
 FOLDERS = ("examples", "examples/flight_computer")

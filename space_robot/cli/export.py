@@ -8,34 +8,18 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from ..console.tables import Column, JudgedCell, Table, named
 from .options import flight_options, plan_flight
 
 if TYPE_CHECKING:
-    from ..export.verify import ReplayVerdict
-
-SECTION = "Flight code"
+    from ..export.folder import ReplayVerdict
 
 
 @click.command()
 @flight_options(
-    "controller",
-    "robot",
-    "gains",
-    "mission",
-    "case",
-    "sensors",
-    "plant_robot",
-    "actuators",
-    "orbit",
-    "navigation",
-    "duration",
-    "period",
-    "swaps",
-    "faults",
-    "seed",
-    "set",
-    "scenario",
-    "json",
+    *("controller", "robot", "gains", "mission", "case", "sensors", "plant_robot", "actuators"),
+    *("orbit", "navigation", "duration", "period", "swaps", "faults", "seed", "set"),
+    *("scenario", "json"),
 )
 @click.option(
     "--law",
@@ -90,10 +74,9 @@ def export(
 
     from ..console.progress import counting_progress
     from ..console.terminal import echo_json
-    from ..export.folder import check_folder, write_folder, write_readme
+    from ..export.folder import check_folder, verify, write_folder, write_readme
     from ..export.software import export as export_software
     from ..export.software import recorded_flights
-    from ..export.verify import verify
     from ..flight.compilation import compile_kernels
     from ..scenario.scenario import Scenario
 
@@ -130,9 +113,7 @@ def export(
 def _print_export(
     folder: Path, figures: Mapping[str, Any], flights: Sequence[tuple[str, str, int]]
 ) -> None:
-    from ..console.tables import Column, Table
-    from ..console.terminal import say, terminal
-    from ..console.terminal_tables import print_table
+    from ..console.terminal import print_table, say, terminal
 
     console = terminal()
     say(
@@ -140,31 +121,19 @@ def _print_export(
         f"{folder}: laws {', '.join(figures['laws'])}; {figures['functions']} kernels, "
         f"{figures['lines']} lines of C99, {figures['state_bytes']} bytes of state",
     )
-    columns = (
-        Column("flight", is_label=True),
-        Column("what", is_label=True),
-        Column("states", spec="d"),
-    )
+    columns = named("flight"), named("what"), Column("states", spec="d")
     print_table(Table.of("Recorded flights", columns, flights), console)
     say(console, f"replay them: make -C {folder}")
 
 
 def _print_verdicts(verdicts: Sequence[ReplayVerdict]) -> None:
+    from ..console.terminal import print_table, terminal
+
     if not verdicts:
         return
-    from ..console.tables import Column, JudgedCell, Table
-    from ..console.terminal import terminal
-    from ..console.terminal_tables import print_table
-
-    columns = (
-        Column("target", is_label=True),
-        Column("states", spec="d"),
-        Column("tick", "ns", ".0f"),
-        Column("verdict", is_label=True),
-    )
-    good = JudgedCell("", "every bit equal", "good")
+    columns = named("target"), Column("states", spec="d"), Column("tick", "ns", ".0f")
     rows = [
-        (v.target, v.states, v.tick_ns, good if v.is_accepted else JudgedCell("", v.reason, "bad"))
+        [v.target, v.states, v.tick_ns, JudgedCell.of(v.is_accepted, "every bit equal", v.reason)]
         for v in verdicts
     ]
-    print_table(Table.of("Acceptance", columns, rows), terminal())
+    print_table(Table.of("Acceptance", [*columns, named("verdict")], rows), terminal())

@@ -8,11 +8,8 @@ from typing import Any
 
 import click
 
-from .completed_names import names_in
-from .numbers import FiniteRange
+from .option_types import FiniteRange, names_in
 from .options import flight_options
-
-SECTION = "Gains and studies"
 
 WORDS = f"{__name__}.words"
 MASS_UNCERTAINTY = click.option(

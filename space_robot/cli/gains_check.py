@@ -16,9 +16,8 @@ from space_robot_control.laws.base import NO_ESTIMATE, NOMINAL_INERTIA
 from space_robot_msgs_py.config.validation import validate
 from space_robot_msgs_py.errors import FlightError, InputError
 
-from ..console.tables import Column, Group, JudgedCell, Table
-from ..console.terminal import say
-from ..console.terminal_tables import print_table
+from ..console.tables import Column, JudgedCell, Table, named
+from ..console.terminal import print_table, say
 from ..flight.plan import Flight, Scenario, resolve
 from ..flight.simulate import simulate
 from ..scenario.node_settings import FlightSettings
@@ -48,10 +47,8 @@ class CheckedGains:
     frequencies: dict[str, tuple[float, float]]
     """By joint with a gear, Hz: lowest and highest frequency of its spring along the mission."""
 
-    with_pair: frozenset[str]
-    """Laws with a time-delay estimate."""
-    with_model: frozenset[str]
-    """Those of them whose estimate has the nominal inertia."""
+    estimates: dict[str, int]
+    """By law: the kind of its time-delay estimate."""
 
     @property
     def is_sound(self) -> bool:
@@ -82,12 +79,10 @@ class CheckedGains:
     def remarks(self) -> list[str]:
         """Which stable laws have little margin, one line for each kind of estimate."""
         small = [check.law for check in self.checks if check.is_stable and not check.has_margin]
-        constant = self.with_pair - self.with_model
-        kinds = {
-            "h_bar leaves": [law for law in small if law in constant],
-            "the nominal inertia leaves": [law for law in small if law in self.with_model],
-            "the observer leaves": [law for law in small if law not in self.with_pair],
-        }
+        words = {NOMINAL_INERTIA: "the nominal inertia leaves", NO_ESTIMATE: "the observer leaves"}
+        kinds: dict[str, list[str]] = {"h_bar leaves": [], **{text: [] for text in words.values()}}
+        for law in small:
+            kinds[words.get(self.estimates[law], "h_bar leaves")].append(law)
         least = f"a margin below {LEAST_MARGIN:.0%} in torque scale"
         return [f"remark: {', '.join(laws)}: {why} {least}" for why, laws in kinds.items() if laws]
 
@@ -120,14 +115,7 @@ def check_laws(options: dict[str, Any], mass_uncertainty: float = 0.2) -> Checke
             for check, name in zip(checks, names, strict=True)
         }
     estimates = {law.name: law.estimate for law in laws}
-    return CheckedGains(
-        flight,
-        checks,
-        ripple,
-        frequencies,
-        frozenset(name for name, kind in estimates.items() if kind != NO_ESTIMATE),
-        frozenset(name for name, kind in estimates.items() if kind == NOMINAL_INERTIA),
-    )
+    return CheckedGains(flight, checks, ripple, frequencies, estimates)
 
 
 def _on_rigid_robot(
@@ -267,13 +255,14 @@ def _tables(checks: CheckedGains) -> Iterator[Table]:
         share = next(iter(masses.values())).share
         title = f"The same with masses and inertias wrong by {share:.0%}"
         note = f"Bounds for all such robots, and the extremes of {DRAWS} drawn at random."
-        yield _table(title, [Column(name, spec=".4f") for name in names], rows, note)
+        columns = named(), *(Column(name, spec=".4f") for name in names)
+        yield Table.of(title, columns, rows, note)
     yield _loops(checks)
     if checks.frequencies:
-        columns = [Column("lowest", spec=".3f"), Column("highest", spec=".3f")]
+        columns = named(), Column("lowest", spec=".3f"), Column("highest", spec=".3f")
         rows = [[name, *extremes] for name, extremes in checks.frequencies.items()]
         title = "Frequency of each gear's spring along the mission, Hz"
-        yield _table(title, columns, rows)
+        yield Table.of(title, columns, rows)
         yield _springs(checks)
     gains = {check.law: check.noise_gain for check in checks.checks}
     title = "Torque that noise on the rate of an axis becomes, N m per rad/s"
@@ -285,73 +274,68 @@ def _tables(checks: CheckedGains) -> Iterator[Table]:
         yield _by_axis(f"{title}N m RMS", checks, checks.ripple, "N", *notes)
 
 
-def _table(
-    title: str, columns: Sequence[Column], rows: Sequence[Sequence[Any]], *notes: str
-) -> Table:
-    return Table(title, [Column("", is_label=True), *columns], [Group(rows)], notes)
-
-
 def _margins(checks: CheckedGains) -> Table:
-    columns = [Column("smallest", spec=".4f"), Column("largest", spec=".4f")]
-    columns += [Column("radius"), Column("margin")]
+    smallest, largest = Column("smallest", spec=".4f"), Column("largest", spec=".4f")
     rows = []
     for check in checks.checks:
         if spectrum := check.spectrum:
-            tone = "good" if spectrum.is_sound else "bad"
-            word = "sound" if spectrum.margin >= LEAST_MARGIN else "small"
-            word = word if spectrum.contracts else "none"
             radius = _holds(f"{spectrum.radius:.4f} < 1", spectrum.contracts)
-            margin = JudgedCell(f"{spectrum.margin:.2%}", word, tone)
+            margin = _margin(spectrum.margin, spectrum.contracts, spectrum.is_sound)
             rows.append([check.law, spectrum.smallest, spectrum.largest, radius, margin])
     inertia = "H_S" if checks.flight.controls_base else "H_f"
     notes = [
         "The margin is the share by which the torque reported may exceed the one commanded "
         "until the time-delay estimate diverges."
     ]
-    if nominal := [check.law for check in checks.checks if check.law in checks.with_model]:
+    if nominal := [law for law, kind in checks.estimates.items() if kind == NOMINAL_INERTIA]:
         notes.append(f"h_bar of {', '.join(nominal)} is {inertia} of the nominal model.")
     title = f"Eigenvalues of {inertia}^-1 h_bar along the mission"
-    return _table(title, columns, rows, *notes)
+    columns = named(), smallest, largest, Column("radius"), Column("margin")
+    return Table.of(title, columns, rows, *notes)
 
 
 def _loops(checks: CheckedGains) -> Table:
     rows = []
     for check in checks.checks:
-        margin: JudgedCell | None = None
-        if (share := check.loop.margin) is not None:
-            word, tone = ("sound", "good") if check.loop.has_margin else ("small", "bad")
-            word = word if check.loop.is_stable else "none"
-            margin = JudgedCell(f"{share:.2%}", word, tone)
-        radius = _holds(f"{check.loop.radius:.6f}", check.loop.is_stable)
-        rows.append([check.law, radius, margin])
+        loop = check.loop
+        margin = None
+        if loop.margin is not None:
+            margin = _margin(loop.margin, loop.is_stable, loop.is_stable and loop.has_margin)
+        rows.append([check.law, _holds(f"{loop.radius:.6f}", loop.is_stable), margin])
     notes = ["A small motion of the rigid robot grows by the radius in a tick if it is above 1."]
     if any(check.loop.margin is not None for check in checks.checks):
         notes.append("The margin of observers is that of the loop; 100 % is the largest searched.")
     title = "Stability of the closed loop along the mission"
-    return _table(title, [Column("radius"), Column("margin")], rows, *notes)
+    return Table.of(title, [named(), Column("radius"), Column("margin")], rows, *notes)
 
 
 def _springs(checks: CheckedGains) -> Table:
-    columns = [Column("radius"), Column("largest\nbandwidth"), Column("largest\nh_bar", spec=".3g")]
     rows = []
     for check in checks.checks:
         if flexible := check.flexible:
             corner = flexible.largest_corner_hz
-            text: str | None = "any" if corner is None else f"{corner:.3g} Hz"
-            text = text if check.law in checks.with_pair else None
+            bandwidth: str | None = "any" if corner is None else f"{corner:.3g} Hz"
+            if checks.estimates[check.law] == NO_ESTIMATE:
+                bandwidth = None
             radius = _holds(f"{flexible.radius:.6f}", flexible.is_stable)
-            rows.append([check.law, radius, text, flexible.largest_h_bar_scale])
+            rows.append([check.law, radius, bandwidth, flexible.largest_h_bar_scale])
     note = (
         "An oscillation grows by the radius in a tick if it is above 1. The bandwidth is the "
         "largest controller.acceleration_filter_hz, and h_bar the largest factor on all of h_bar "
         "(of an observer: on its inertia), with which it does not; switching terms are not counted."
     )
     title = "Stability with the springs of the gears along the mission"
-    return _table(title, columns, rows, note)
+    h_bar = Column("largest\nh_bar", spec=".3g")
+    columns = named(), Column("radius"), Column("largest\nbandwidth"), h_bar
+    return Table.of(title, columns, rows, note)
 
 
 def _holds(text: str, value: bool) -> JudgedCell:
-    return JudgedCell(text, *(("holds", "good") if value else ("fails", "bad")))
+    return JudgedCell.of(value, "holds", "fails", text)
+
+
+def _margin(share: float, is_stable: bool, is_sound: bool) -> JudgedCell:
+    return JudgedCell.of(is_sound, "sound", "small" if is_stable else "none", f"{share:.2%}")
 
 
 def _by_axis(
@@ -371,4 +355,4 @@ def _by_axis(
         ]
         for axis, name in enumerate(robot.axis_names)
     ]
-    return _table(title, [Column(law, spec=".3g") for law in columns], rows, *notes)
+    return Table.of(title, [named(), *(Column(law, spec=".3g") for law in columns)], rows, *notes)

@@ -6,10 +6,9 @@ import atexit
 import gc
 import io
 import os
-import pkgutil
 import re
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
 from importlib import import_module
 from typing import NoReturn
@@ -30,39 +29,56 @@ _NO_CHOICE = re.compile(r"(.*) is not one of .*\.")
 _KINDS = {"float": "a number", "integer": "a whole number"}
 _HELP_TOPICS = {"campaign": "campaign", "gains": "gains", "plan": "own-trajectory"}
 """Topics of commands, for errors without a topic of their own."""
-SECTIONS = (
-    "Begin",
-    "Fly",
-    "Robots, missions and own pieces",
-    "Results",
-    "Gains and studies",
-    "Flight code",
-)
-"""Headings, in order; the module of each command has one of them as ``SECTION``."""
+SECTIONS = {
+    "Begin": ("completion", "doctor", "examples", "help"),
+    "Fly": ("fly", "goto", "scenario", "sim", "simulate"),
+    "Robots, missions and own pieces": ("new", "plan", "robot", "urdf"),
+    "Results": ("analyze", "diff", "replay", "view"),
+    "Gains and studies": ("campaign", "choose", "gains", "reproduce", "stability"),
+    "Flight code": ("export",),
+}
+"""Headings of the help, and the commands below each."""
+SHARED_MODULES = {
+    **{"completion": "shell", "help": "shell"},
+    **{"fly": "flights", "scenario": "flights", "simulate": "flights"},
+    **{"goto": "graph", "sim": "graph"},
+    **{"robot": "robots", "urdf": "robots"},
+    **{"reproduce": "paper", "stability": "paper"},
+}
+"""Modules of commands that share one; others have one of their name."""
+COMMANDS = {name: SHARED_MODULES.get(name, name) for names in SECTIONS.values() for name in names}
+"""Module of each command, imported when the command is used."""
 LONGEST_HELP = 200
 """Characters of a command's first sentence, which is wrapped and not cut."""
 
 
-class SectionedGroup(click.Group):
-    """A group whose help lists its commands by `SECTIONS`, each with its first sentence."""
+class LazyGroup(click.Group):
+    """The group of `COMMANDS`; its help lists them by `SECTIONS`, each with its first sentence."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        """Return the names of all commands."""
+        return sorted(COMMANDS)
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        """Import a command."""
+        if cmd_name not in COMMANDS:
+            return None
+        module = import_module(f"{__package__}.{COMMANDS[cmd_name]}")
+        command: click.Command = getattr(module, cmd_name)
+        return command
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        """Write a section for each heading that has commands."""
-        rows: dict[str, list[tuple[str, str]]] = {heading: [] for heading in SECTIONS}
-        for name in self.list_commands(ctx):
-            command = self.get_command(ctx, name)
-            if command is not None and not command.hidden:
-                rows[section_of(command)].append((name, command.get_short_help_str(LONGEST_HELP)))
-        for heading, commands in rows.items():
-            if commands:
-                with formatter.section(heading):
-                    formatter.write_dl(commands)
-
-
-def section_of(command: click.Command) -> str:
-    """Return the heading under which a command is listed."""
-    heading: str = vars(sys.modules[command.callback.__module__])["SECTION"]
-    return heading
+        """Write a section for each heading."""
+        for heading, names in SECTIONS.items():
+            commands = {name: self.get_command(ctx, name) for name in names}
+            with formatter.section(heading):
+                formatter.write_dl(
+                    [
+                        (name, command.get_short_help_str(LONGEST_HELP))
+                        for name, command in commands.items()
+                        if command is not None
+                    ]
+                )
 
 
 def _show_version(context: click.Context, option: click.Parameter, is_asked: bool) -> None:
@@ -73,7 +89,7 @@ def _show_version(context: click.Context, option: click.Parameter, is_asked: boo
         context.exit()
 
 
-@click.group(cls=SectionedGroup, context_settings={"help_option_names": ["-h", "--help"]})
+@click.group(cls=LazyGroup, context_settings={"help_option_names": ["-h", "--help"]})
 @click.option(
     "--version",
     is_flag=True,
@@ -106,20 +122,6 @@ def cli() -> None:
       space-robot doctor                            what this machine has for flights
       space-robot help                              short answers by topic
     """
-
-
-def commands() -> Iterator[click.Command]:
-    """Yield the commands of this folder; each is named as its file."""
-    folder = import_module(__package__)
-    for module in pkgutil.iter_modules(folder.__path__):
-        if "_" not in module.name and module.name != "main":
-            value = getattr(import_module(f"{__package__}.{module.name}"), module.name, None)
-            if isinstance(value, click.Command):
-                yield value
-
-
-for command in commands():
-    cli.add_command(command)
 
 
 def main(arguments: Sequence[str] | None = None) -> NoReturn:
@@ -210,8 +212,7 @@ def _reworded(error: click.ClickException, context: click.Context | None) -> str
     text = error.format_message()
     if (command := _NO_COMMAND.match(text)) and context:
         group = context.command
-        commands = group.commands if isinstance(group, click.Group) else {}
-        names = [name for name, item in commands.items() if not item.hidden]
+        names = group.list_commands(context) if isinstance(group, click.Group) else []
         return f"no such command {command[1]!r}: {choices(command[1], names)}"
     if extra := _EXTRA.match(text):
         return f"unexpected argument {extra[1]!r}"

@@ -13,14 +13,11 @@ import click
 from click.shell_completion import CompletionItem
 
 from . import new_files
-from .completed_names import names_in
-from .numbers import NumberList
+from .option_types import NumberList, names_in
 from .options import BASE, REPAIR, flight_options
 
 if TYPE_CHECKING:
     from space_robot_model.robot.urdf import Mount
-
-SECTION = "Robots, missions and own pieces"
 
 
 class NewGroup(click.Group):
@@ -210,8 +207,7 @@ def new_robot(
     from ..choice.report import candidates_table
     from ..choice.robot_files import CAMPAIGN_FILE, robot_texts
     from ..console.progress import counting_progress
-    from ..console.terminal import echo_json, terminal
-    from ..console.terminal_tables import print_table
+    from ..console.terminal import echo_json, print_table, terminal
     from ..flight.compilation import compile_lanes
     from ..processes.executor import cores
 

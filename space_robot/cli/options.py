@@ -11,9 +11,11 @@ import click
 from click.core import ParameterSource
 
 from ..scenario.options import OPTIONS
-from .completed_names import names_in
+from .option_types import NameOrNumbers, names_in
 
 if TYPE_CHECKING:
+    from space_robot_msgs_py.bag.flight_log import FlightLog
+
     from ..flight.plan import Flight
     from ..scenario.resolved import ResolvedScenario
 
@@ -21,7 +23,6 @@ Decorator = Callable[[Any], Any]
 
 
 def _remap(context: click.Context, option: click.Parameter, texts: Any) -> dict[str, str]:
-    """``/arm/states:=/joint_states`` to ``{"/arm/states": "/joint_states"}``."""
     from space_robot_msgs_py.config.validation import one_of
     from space_robot_msgs_py.topics import BY_NAME
 
@@ -48,25 +49,60 @@ def file_option(*names: str, help: str) -> Decorator:
     return click.option(*names, type=kind, metavar="FILE", help=help)
 
 
-REMAP = click.option(
-    "--remap",
-    multiple=True,
-    callback=_remap,
-    metavar="THEIRS:=OURS",
-    help="Take their topic for ours, as /arm/states:=/joint_states; may be repeated.",
-)
+def bag_options(function: Any) -> Any:
+    """Give a command the options by which bags are read: --remap, --namespace and --trust."""
+    for decorator in (
+        click.option(
+            "--trust",
+            is_flag=True,
+            help="Import the law and read the files that the bag names: runs the bag's code.",
+        ),
+        click.option(
+            "--namespace",
+            metavar="NS",
+            help="Of the robot, as /sat1, where a bag has several [default: the only one].",
+        ),
+        click.option(
+            "--remap",
+            multiple=True,
+            callback=_remap,
+            metavar="THEIRS:=OURS",
+            help="Take their topic for ours, as /arm/states:=/joint_states; may be repeated.",
+        ),
+    ):
+        function = decorator(function)
+    return function
 
-NAMESPACE = click.option(
-    "--namespace",
-    metavar="NS",
-    help="Of the robot, as /sat1, where a bag has several [default: the only one].",
-)
 
-TRUST = click.option(
-    "--trust",
-    is_flag=True,
-    help="Import the law and read the files that the bag names: runs the bag's code.",
-)
+def excerpt_options(function: Any) -> Any:
+    """Give a command ``read``, which reads an excerpt of a bag as its options say."""
+
+    @wraps(function)
+    def command(
+        *args: Any,
+        from_s: float | None,
+        to_s: float | None,
+        remap: dict[str, str],
+        namespace: str | None,
+        trust: bool,
+        **options: Any,
+    ) -> Any:
+        def read(bag: Path) -> FlightLog:
+            from space_robot_msgs_py.bag.reader import read_flight
+
+            from ..analysis import excerpt
+
+            return excerpt(read_flight(bag, remap, trust, namespace), from_s, to_s)
+
+        return function(*args, read=read, **options)
+
+    begin = click.option(
+        "--from", "from_s", type=float, metavar="T", help="Begin at T simulated seconds."
+    )
+    end = click.option(
+        "--to", "to_s", type=float, metavar="T", help="End before T simulated seconds."
+    )
+    return begin(end(bag_options(command)))
 
 
 def _list_faults(
@@ -132,18 +168,6 @@ def _click_option(name: str) -> Decorator:
     if name == "faults":
         settings["callback"] = _list_faults
     return click.option(flag, name, **settings)
-
-
-class NameOrNumbers(click.ParamType[Any]):
-    """A name or a path; in a scenario file also a mapping of the numbers."""
-
-    name = "text"
-
-    def convert(
-        self, value: Any, param: click.Parameter | None, context: click.Context | None
-    ) -> Any:
-        """Return the value unchanged."""
-        return value
 
 
 def _use_scenario(

@@ -8,11 +8,9 @@ from typing import Any
 
 import click
 
-from .completed_names import names_in
-from .numbers import FiniteRange
-from .options import NameOrNumbers, file_option, flight_options, resolve_options
-
-SECTION = "Robots, missions and own pieces"
+from ..console.tables import Column, JudgedCell, Table, named
+from .option_types import FiniteRange, NameOrNumbers, names_in
+from .options import file_option, flight_options, resolve_options
 
 
 @click.command()
@@ -112,6 +110,7 @@ def plan(
         raise FlightError(f"refused: {refused}")
 
 
+TORQUE, MOMENTUM = Column("torque", "N m", ".3g"), Column("momentum", "N m s", ".3g")
 SIGMA = (
     "σ: smallest singular value of the tool's Jacobian, with the base's attitude held and with a "
     "free base; its rows of translation are divided by the tool's distance from the base"
@@ -123,26 +122,23 @@ MANY = 1e3
 
 
 def _print_plan(report: Mapping[str, Any]) -> None:
-    from ..console.tables import Column, JudgedCell, Table
-    from ..console.terminal import say, terminal
-    from ..console.terminal_tables import print_table
+    from ..console.terminal import print_table, say, terminal
 
     console = terminal()
-    segments: list[tuple[Column, Callable[[Mapping[str, Any]], Any]]] = [
-        (Column("segment", is_label=True), lambda s: f"{s['segment']} {s['motion']}"),
+    columns: list[tuple[Column, Callable[[Mapping[str, Any]], Any]]] = [
+        (named("segment"), lambda s: f"{s['segment']} {s['motion']}"),
         (Column("end", "s", ".2f"), lambda s: s["begin_s"] + s["duration_s"]),
         (Column("tool", "m", ".3f"), lambda s: s["tool_travel_m"]),
-        (Column("torque", "N m", ".3g"), lambda s: s["base_torque"]),
-        (Column("momentum", "N m s", ".3g"), lambda s: s["momentum"]),
+        (TORQUE, lambda s: s["base_torque"]),
+        (MOMENTUM, lambda s: s["momentum"]),
         (Column("at its end", "N m s", ".3g"), lambda s: s["momentum_end"]),
         (Column("σ held", "", ".2g"), lambda s: s["singular_value"]),
         (Column("σ free", "", ".2g"), lambda s: s["free_singular_value"]),
     ]
     if all(s["momentum_end"] <= NO_MOMENTUM for s in report["segments"]):
-        del segments[5]
-    rows = [[value(segment) for _, value in segments] for segment in report["segments"]]
-    heads = [head for head, _ in segments]
-    print_table(Table.of("", heads, rows), console)
+        del columns[5]
+    rows = [[value(segment) for _, value in columns] for segment in report["segments"]]
+    print_table(Table.of("", [column for column, _ in columns], rows), console)
     say(console, SIGMA)
     if len(report["sources"]) > 1:
         sources = {**report["sources"], "all, without unloading": report}
@@ -150,25 +146,19 @@ def _print_plan(report: Mapping[str, Any]) -> None:
             [name.replace("_", " "), own["base_torque"], own["momentum"], own["momentum_end"]]
             for name, own in sources.items()
         ]
-        heads = [
-            Column("given for", is_label=True),
-            Column("torque", "N m", ".3g"),
-            Column("momentum", "N m s", ".3g"),
-            Column("at the end", "N m s", ".3g"),
-        ]
-        print_table(Table.of("", heads, rows), console)
-    verdicts = {True: JudgedCell("", "yes", "good"), False: JudgedCell("", "no", "bad")}
+        at_end = Column("at the end", "N m s", ".3g")
+        print_table(Table.of("", [named("given for"), TORQUE, MOMENTUM, at_end], rows), console)
     rows = [
-        [a["actuators"], _percent(a["torque"]), _percent(a["momentum"]), verdicts[a["is_feasible"]]]
-        for a in report["actuators"]
+        [
+            own["actuators"],
+            _percent(own["torque"]),
+            _percent(own["momentum"]),
+            JudgedCell.of(own["is_feasible"], "yes", "no"),
+        ]
+        for own in report["actuators"]
     ]
-    heads = [
-        Column("actuators", is_label=True),
-        Column("torque", "%", ".0f"),
-        Column("momentum", "%", ".0f"),
-        Column("feasible", is_label=True),
-    ]
-    print_table(Table.of("", heads, rows), console)
+    shares = Column("torque", "%", ".0f"), Column("momentum", "%", ".0f")
+    print_table(Table.of("", [named("actuators"), *shares, named("feasible")], rows), console)
     say(
         console,
         f"{report['duration_s']:.2f} s; largest base torque {report['base_torque']:.3g} N m, "

@@ -7,10 +7,8 @@ from typing import Any
 
 import click
 
-from .numbers import FiniteRange
-from .options import NAMESPACE, REMAP, TRUST, file_option, flight_option
-
-SECTION = "Results"
+from .option_types import FiniteRange
+from .options import bag_options, file_option, flight_option
 
 
 @click.command()
@@ -35,9 +33,7 @@ SECTION = "Results"
 )
 @file_option("--csv", "table", help="File for both torques of every tick.")
 @file_option("--plot", help="Picture of both torques by axis, as PNG and SVG.")
-@REMAP
-@NAMESPACE
-@TRUST
+@bag_options
 @flight_option("json")
 def replay(
     bag: Path,
@@ -75,6 +71,7 @@ def replay(
     from ..console.files import check_writable
     from ..console.terminal import echo_json, terminal
     from ..flight.replay.run import replay as run
+    from . import replay_display as display
 
     if other := sorted(set(parameters) - {"controller"}):
         raise InputError(f"--set {other[0]}.…: a replay has no {other[0]}, only the controller")
@@ -91,23 +88,17 @@ def replay(
     )
     report, period = done.report(), done.recording.timebase.period
     if table:
-        from .replay_files import write_csv
-
-        write_csv(done.comparison, period, table)
+        display.write_csv(done.comparison, period, table)
     if plot:
-        from .replay_display import title
-        from .replay_files import write_plot
+        from ..analysis.figures.style import save_figure  # slow to import
 
-        write_plot(done.comparison, period, title(report), plot)
+        figure = display.torque_figure(done.comparison, period, display.title(report))
+        save_figure(figure, plot.with_suffix(""))
     if as_json:
         echo_json(report)
     else:
-        from .replay_display import print_replay
-
-        print_replay(report, terminal())
+        display.print_replay(report, terminal())
     if done.error:
         raise done.error
     if not done.has_passed:
-        from .replay_display import verdict
-
-        raise FlightError(verdict(report))
+        raise FlightError(display.verdict(report))

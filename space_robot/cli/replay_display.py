@@ -1,17 +1,25 @@
-"""Terminal output of a replay: counts, first difference, differences by axis."""
+"""Output of a replay: counts, first difference, differences by axis; torques as CSV and figure."""
 
 from __future__ import annotations
 
-from typing import Any
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
+import numpy as np
 from rich.console import Console
 
 from space_robot_msgs_py.bag.law_history import in_words
 
 from ..analysis.words import flown as words_of
-from ..console.tables import Column, Table
-from ..console.terminal import say
-from ..console.terminal_tables import print_table
+from ..console.files import csv_rows, csv_writer
+from ..console.tables import Column, Table, named
+from ..console.terminal import print_table, say
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from ..flight.replay.comparison import Comparison
 
 COUNTS = {
     "played": "states replayed",
@@ -30,7 +38,7 @@ MOST_STRETCHES = 10
 def print_replay(report: dict[str, Any], console: Console) -> None:
     """Print the report of `run.Replay`."""
     say(console, title(report))
-    print_table(Table.of("", (Column(is_label=True), Column()), counts(report)), console)
+    print_table(Table.of("", (named(), Column()), counts(report)), console)
     for text in filter(None, (report["unfinished"], *report["damage"])):
         say(console, text)
     if not report["whole"] and len(report["stretches"]) > 1:
@@ -99,45 +107,60 @@ def verdict(report: dict[str, Any]) -> str:
 
 
 def _print_stretches(stretches: list[dict[str, Any]], console: Console) -> None:
-    columns = (
-        Column("from, s", spec=".4f"),
-        Column("to, s", spec=".4f"),
-        Column("compared"),
-        Column("equal"),
-    )
     shown = stretches[:MOST_STRETCHES]
     rows = [[s["from_s"], s["to_s"], str(s["compared"]), str(s["equal"])] for s in shown]
     more = "" if len(stretches) == len(shown) else f" (the first {len(shown)} of {len(stretches)})"
+    times = Column("from, s", spec=".4f"), Column("to, s", spec=".4f")
+    columns = *times, Column("compared"), Column("equal")
     print_table(Table.of(f"whole stretches of the bag{more}", columns, rows), console)
 
 
 def _print_first(first: dict[str, Any], console: Console) -> None:
     title = f"first difference: tick {first['tick']}, t = {first['time_s']:.4f} s"
-    columns = (
-        Column("field", is_label=True),
-        Column("recorded"),
-        Column("replayed"),
-        Column("by", spec=".3g"),
-    )
-    rows = [
-        [
-            field["field"],
-            str(field["recorded"]),
-            str(field["replayed"]),
-            "" if field["difference"] is None else field["difference"],
-        ]
-        for field in first["fields"]
-    ]
+    columns = (named("field"), Column("recorded"), Column("replayed"), Column("by", spec=".3g"))
+    rows = []
+    for field in first["fields"]:
+        by = "" if field["difference"] is None else field["difference"]
+        rows.append([field["field"], str(field["recorded"]), str(field["replayed"]), by])
     print_table(Table.of(title, columns, rows), console, dense=True)  # all digits in 80 columns
 
 
 def _print_axes(report: dict[str, Any], console: Console) -> None:
     names = ("RMS recorded", "RMS replayed", "RMS of difference", "largest difference")
-    columns = Column("axis", is_label=True), *(Column(name, spec=".4g") for name in names)
-    rows = [
-        [axis if unit == "N m" else f"{axis} ({unit})", *numbers]
-        for axis, (unit, *numbers) in (
-            (name, values.values()) for name, values in report["axes"].items()
-        )
-    ]
+    columns = named("axis"), *(Column(name, spec=".4g") for name in names)
+    rows = []
+    for axis, values in report["axes"].items():
+        unit, *numbers = values.values()
+        rows.append([axis if unit == "N m" else f"{axis} ({unit})", *numbers])
     print_table(Table.of("torque, N m, over the ticks compared", columns, rows), console)
+
+
+def write_csv(comparison: Comparison, period: float, path: Path) -> None:
+    """Write a row per tick: tick, time in s, torque of each axis in N m or N."""
+    ticks, recorded, replayed = comparison.table()
+    names = [
+        f"{axis}_{which}" for which in ("recorded", "replayed") for axis in comparison.axis_names
+    ]
+    numbers = np.column_stack([(ticks * period).round(9), recorded, replayed])
+    with csv_writer(path, replace=True) as writer:
+        writer.writerow(["tick", "time_s", *names])
+        writer.writerows(csv_rows(ticks, numbers))
+
+
+def torque_figure(comparison: Comparison, period: float, title: str) -> Figure:
+    """Plot the recorded and the replayed torque of every axis over time."""
+    from ..analysis.figures import style  # slow to import
+
+    ticks, recorded, replayed = comparison.table()
+    time, names = ticks.astype(np.float64) * period, comparison.axis_names
+    with style.house_style():
+        figure = style.page(14.0 + 48.0 * math.ceil(len(names) / 3), title)
+        panels = style.grid(figure, len(names), 3, shared=False)
+        for index, (axes, name) in enumerate(zip(panels, names, strict=True)):
+            both = np.column_stack([recorded[:, index], replayed[:, index]])
+            style.plot_lines(axes, time, both, dashed=True)
+            axes.set_title(style.plain(name))
+            unit = comparison.units[index]
+            axes.set(xlabel="time (s)", ylabel="force (N)" if unit == "N" else f"torque ({unit})")
+        style.legend_above(figure, ("recorded", "replayed"), dashed=True)
+    return figure

@@ -12,8 +12,7 @@ from rich.console import Console
 
 from ..analysis.report_tables import comparison_table, rms_table, sizing_table
 from ..analysis.words import notes, remarks
-from ..console.terminal import echo_json, say, terminal
-from ..console.terminal_tables import print_table
+from ..console.terminal import echo_json, print_table, say, terminal
 
 LABELS = 44
 """Terminal width of names and units beside the metrics of several bags."""

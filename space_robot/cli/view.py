@@ -4,15 +4,19 @@ from __future__ import annotations
 
 import os
 import webbrowser
+from collections.abc import Callable
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import click
 from click.core import ParameterSource
 
-from .numbers import FiniteRange
-from .options import NAMESPACE, REMAP, TRUST, file_option
+from .option_types import FiniteRange
+from .options import excerpt_options, file_option
 
-SECTION = "Results"
+if TYPE_CHECKING:
+    from space_robot_msgs_py.bag.flight_log import FlightLog
+
 SUFFIXES = (".html", ".htm")
 NICENESS = 10
 """Niceness of the live viewer, so that it does not delay the graph."""
@@ -55,8 +59,6 @@ USUAL_PLOTS = "errors, drift, torques, actuators"
     metavar="HZ",
     help="Poses a second of flight [default: 30]; fewer where the page grew beyond 3 MB.",
 )
-@click.option("--from", "from_s", type=float, metavar="T", help="Begin at T simulated seconds.")
-@click.option("--to", "to_s", type=float, metavar="T", help="End before T simulated seconds.")
 @click.option(
     "--robot",
     default="",
@@ -72,9 +74,7 @@ USUAL_PLOTS = "errors, drift, torques, actuators"
     help=f"Shown first [default: {USUAL_PLOTS}].",
 )
 @click.option("--light", is_flag=True, help="Dark on white, to print.")
-@REMAP
-@NAMESPACE
-@TRUST
+@excerpt_options
 @click.option("--live", is_flag=True, help="What flies now: serve the scene until Ctrl-C.")
 @click.option(
     "--domain",
@@ -97,15 +97,11 @@ def view(
     opens: bool,
     side_by_side: bool,
     rate: float,
-    from_s: float | None,
-    to_s: float | None,
     robot: str,
     title: str,
     plots: str,
     light: bool,
-    remap: dict[str, str],
-    namespace: str | None,
-    trust: bool,
+    read: Callable[[Path], FlightLog],
     live: bool,
     domain: int | None,
     port: int,
@@ -127,10 +123,8 @@ def view(
       space-robot view --live
       space-robot view --live --domain 7 --namespace /sat1
     """
-    from space_robot_msgs_py.bag.reader import read_flight
     from space_robot_msgs_py.errors import InputError
 
-    from ..analysis import excerpt
     from ..analysis.plotted import parse_kinds
     from ..console.files import atomic_file, check_writable, make_folder
     from ..console.progress import counting_progress
@@ -142,7 +136,7 @@ def view(
     kinds = parse_kinds(plots) if plots else ()
     check_viser()
     if live:
-        _serve(domain, namespace, port, light, opens, kinds)
+        _serve(opens, domain, context.params["namespace"] or "", port, not light, kinds)
         return
     names = bag_names(bags)
     page = out or Path(f"{'_'.join(names)}_view.html")
@@ -150,10 +144,7 @@ def view(
         raise InputError(f"--out {page}: a page's name ends in {' or '.join(SUFFIXES)}")
     make_folder(page.parent)
     check_writable(page)
-    logs = {
-        name: excerpt(read_flight(bag, remap, trust, namespace), from_s, to_s)
-        for name, bag in zip(names, bags, strict=True)
-    }
+    logs = {name: read(bag) for name, bag in zip(names, bags, strict=True)}
     robots = {name: shown_robot(log, robot) for name, log in logs.items()}
     for line in remarks_on(logs, robots):
         click.echo(line, err=True)
@@ -181,14 +172,7 @@ def _check_options(context: click.Context, live: bool, bags: tuple[Path, ...]) -
             raise InputError(f"{option.opts[0]} is for {other} only")
 
 
-def _serve(
-    domain: int | None,
-    namespace: str | None,
-    port: int,
-    light: bool,
-    opens: bool,
-    plots: tuple[str, ...],
-) -> None:
+def _serve(opens: bool, *settings: Any) -> None:
     from ..flight.graph.orchestrator import require_ros
 
     require_ros()
@@ -196,7 +180,7 @@ def _serve(
     from ..processes.interruption import Interrupted
     from ..view.live import serve
 
-    events = serve(domain, namespace or "", port, not light, plots)
+    events = serve(*settings)
     try:
         address = next(events)
         click.echo(f"the scene is at {address}; Ctrl-C ends", err=True)

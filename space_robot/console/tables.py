@@ -1,6 +1,6 @@
 """Data model of all tables, and their text as Markdown.
 
-`terminal_tables.print_table` prints it on a terminal, ``templates/table.html.j2`` in a page.
+`terminal.print_table` prints it on a terminal, ``templates/table.html.j2`` in a page.
 """
 
 from __future__ import annotations
@@ -29,6 +29,11 @@ class Column(NamedTuple):
         return f"{self.name}, {self.unit}" if self.unit else self.name
 
 
+def named(name: str = "") -> Column:
+    """Return a column of names or other texts."""
+    return Column(name, is_label=True)
+
+
 class JudgedCell(NamedTuple):
     """A cell with a verdict."""
 
@@ -37,6 +42,11 @@ class JudgedCell(NamedTuple):
     word: str
     tone: str
     """``good``, ``bad`` or ``open``."""
+
+    @classmethod
+    def of(cls, is_good: bool, good: str, bad: str, text: str = "") -> JudgedCell:
+        """Return a cell with one of two verdicts."""
+        return cls(text, good, "good") if is_good else cls(text, bad, "bad")
 
     def __str__(self) -> str:
         """Return text and verdict."""
@@ -68,9 +78,9 @@ class Table:
     """Sentences below the table."""
 
     @classmethod
-    def of(cls, title: str, columns: Sequence[Column], rows: Sequence[Row]) -> Table:
+    def of(cls, title: str, columns: Sequence[Column], rows: Sequence[Row], *notes: str) -> Table:
         """Return a table with one group without name."""
-        return cls(title, columns, [Group(rows)])
+        return cls(title, columns, [Group(rows)], notes)
 
     def texts(self, group: Group) -> Iterator[list[str]]:
         """Yield each row of a group as texts."""

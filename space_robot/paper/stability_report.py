@@ -11,8 +11,7 @@ import numpy as np
 from rich.console import Console
 
 from ..console.tables import Column, JudgedCell, Table, Value
-from ..console.terminal import say
-from ..console.terminal_tables import print_table
+from ..console.terminal import print_table, say
 from .lyapunov import Certificate
 from .stability import (
     LEMMA_1_EVERY_S,

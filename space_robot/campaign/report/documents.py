@@ -17,8 +17,7 @@ from space_robot.analysis.report import template
 from ...analysis.figures.figure_set import Drawing, SavedFigure
 from ...analysis.figures.style import save_figure
 from ...console.tables import Table, as_markdown
-from ...console.terminal import say
-from ...console.terminal_tables import print_table
+from ...console.terminal import print_table, say
 from .figures import drawings
 from .findings import CONFIDENCE, Findings
 from .tables import (

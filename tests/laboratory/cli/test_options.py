@@ -15,10 +15,9 @@ from hypothesis import strategies as st
 from paths import CONFIG
 
 from space_robot.cli import main as cli
-from space_robot.cli.fly import fly
+from space_robot.cli.flights import fly, simulate
 from space_robot.cli.launch_arguments import launch_arguments, launched_flight, refuse_unknown
-from space_robot.cli.numbers import FiniteRange
-from space_robot.cli.simulate import simulate
+from space_robot.cli.option_types import FiniteRange
 from space_robot.flight.graph.node_names import started_nodes
 from space_robot.flight.graph.orchestrator import flight_parameters
 from space_robot.flight.plan import Flight, Scenario, resolve
@@ -37,7 +36,7 @@ def planned(monkeypatch: pytest.MonkeyPatch) -> list[Scenario]:
         plans.append(validate(Scenario, options, "options"))
         raise InputError("not to be flown")
 
-    monkeypatch.setattr("space_robot.cli.simulate.plan_flight", plan)
+    monkeypatch.setattr("space_robot.cli.flights.plan_flight", plan)
     return plans
 
 

@@ -13,8 +13,7 @@ from hypothesis import strategies as st
 from space_robot.analysis.report import template
 from space_robot.console import progress
 from space_robot.console.tables import Column, Group, JudgedCell, Table, as_markdown
-from space_robot.console.terminal import say, terminal
-from space_robot.console.terminal_tables import LONGEST_WORD, print_table
+from space_robot.console.terminal import LONGEST_WORD, print_table, say, terminal
 from space_robot_control.laws import laws
 
 COLUMNS = Column("law", is_label=True), Column("error", "rad", ".2e"), Column("verdict")

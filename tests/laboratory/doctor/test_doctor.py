@@ -9,8 +9,8 @@ import pytest
 from command import Run
 from flights import space_robot as started
 
-from space_robot.doctor import CheckedItem
-from space_robot.doctor.checks import (
+from space_robot.doctor import (
+    CheckedItem,
     check_deadlines,
     check_disk,
     check_distribution,
@@ -183,7 +183,7 @@ NAMES = (
 
 
 def test_the_report_as_json(space_robot: Run, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("space_robot.doctor.checks.CLOCK_S", 0.05)
+    monkeypatch.setattr("space_robot.doctor.CLOCK_S", 0.05)
     code, out, _ = space_robot("doctor", "--json")
     report = json.loads(out)
     keys = {"can_fly_in_process", "can_fly_with_ros", "commit", "versions", "items"}

@@ -16,8 +16,8 @@ from flights import space_robot_here
 from paths import ROOT
 from robots import driven_paper
 
+from space_robot.export.folder import CROSS, EMULATORS
 from space_robot.export.software import export
-from space_robot.export.verify import CROSS, EMULATORS
 from space_robot.flight.plan import Flight, Scenario, resolve
 from space_robot_control.flight_code.folder import Exported
 from space_robot_control.laws import laws

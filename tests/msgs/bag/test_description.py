@@ -17,8 +17,7 @@ from hypothesis import strategies as st
 from space_robot.analysis import analyze
 from space_robot.analysis.report_tables import metrics_table, rms_table
 from space_robot.cli.report_display import print_comparison
-from space_robot.console.terminal import terminal
-from space_robot.console.terminal_tables import print_table
+from space_robot.console.terminal import print_table, terminal
 from space_robot.flight.plan import Flight, Scenario, resolve
 from space_robot.flight.replay.choice import ControllerChoice
 from space_robot.flight.replay.recording import Recording

@@ -1,4 +1,4 @@
-"""The command ``space-robot goto``: move tool, joints or base of a flight that is under way."""
+"""The commands ``space-robot sim`` and ``goto``, for a graph of nodes that flies."""
 
 from __future__ import annotations
 
@@ -7,10 +7,75 @@ from typing import Any
 
 import click
 
-from .numbers import FiniteRange, NumberList
-from .sim import graph_options
+from .option_types import FiniteRange, NumberList
 
-SECTION = "Fly"
+
+def graph_options(function: Any) -> Any:
+    """Give a command the options that select a graph."""
+    namespace = click.option(
+        "--namespace", default="", metavar="NS", help="Of the robot, as /sat1."
+    )
+    domain = click.option(
+        "--domain",
+        type=click.IntRange(0, 232),
+        help="ROS domain [default: ROS_DOMAIN_ID, or that of the only plant here].",
+    )
+    return domain(namespace(function))
+
+
+@click.group()
+def sim() -> None:
+    """Pause, step, resume or reset a running graph of nodes.
+
+    The commands call services of the plant node, for users without `ros2 service call`.
+
+    \b
+    Examples:
+      space-robot fly --paused --domain 7
+      space-robot sim step --ticks 10 --domain 7
+      space-robot sim resume --domain 7
+    """
+
+
+@sim.command()
+@graph_options
+def pause(**options: Any) -> None:
+    """Hold the plant at its present tick; watchdogs ignore the pause."""
+    _call("pause", **options)
+
+
+@sim.command()
+@graph_options
+def resume(**options: Any) -> None:
+    """Resume a paused plant."""
+    _call("resume", **options)
+
+
+@sim.command()
+@click.option("--ticks", type=int, default=1, show_default=True, help="Ticks to go on.")
+@graph_options
+def step(**options: Any) -> None:
+    """Advance a paused plant by some ticks; return when it is paused again."""
+    _call("step", **options)
+
+
+@sim.command()
+@graph_options
+def reset(**options: Any) -> None:
+    """Reset the whole graph to tick 0; a paused graph stays paused.
+
+    Plant, controller, mission and recorder start again. The recorder closes its bag and renames
+    it to BAG_before_reset_1; the new flight is recorded to BAG, from tick 0.
+    """
+    _call("reset", **options)
+
+
+def _call(action: str, **options: Any) -> None:
+    from ..flight.graph.node_services import call_simulation
+    from ..flight.graph.orchestrator import require_ros
+
+    require_ros()
+    click.echo(call_simulation(action, **options))
 
 
 def _attitude(
@@ -50,7 +115,16 @@ def _attitude(
     help="Seconds [default: as fast as the limits allow].",
 )
 @graph_options
-def goto(domain: int | None, namespace: str, **options: Any) -> None:
+def goto(
+    domain: int | None,
+    namespace: str,
+    tool: list[float] | None,
+    rpy: list[float] | None,
+    frame: str,
+    joints: list[float] | None,
+    base: dict[str, Any] | None,
+    duration: float | None,
+) -> None:
     """Move the tool, the joints or the base of a robot that flies on a graph.
 
     The motion replaces the rest of the mission. A reference that moves is brought to rest first,
@@ -68,19 +142,6 @@ def goto(domain: int | None, namespace: str, **options: Any) -> None:
     from ..flight.graph.orchestrator import require_ros
 
     require_ros()
-    segment = _segment(**options)
-    go_to(json.dumps(segment), domain, namespace)
-    click.echo(f"flying {json.dumps(segment)}")
-
-
-def _segment(
-    tool: list[float] | None,
-    rpy: list[float] | None,
-    frame: str,
-    joints: list[float] | None,
-    base: dict[str, Any] | None,
-    duration: float | None,
-) -> dict[str, Any]:
     segment: dict[str, Any] = {"duration": duration or "fast"}
     if tool or rpy:
         goal = {"frame": frame, "xyz": tool, "rpy_deg": rpy}
@@ -91,4 +152,6 @@ def _segment(
         segment["base"] = base
     if len(segment) == 1:
         raise click.UsageError("give --tool, --rpy, --joints or --base")
-    return segment
+    text = json.dumps(segment)
+    go_to(text, domain, namespace)
+    click.echo(f"flying {text}")

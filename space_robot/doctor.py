@@ -107,11 +107,7 @@ def check_python(python: tuple[int, int] = sys.version_info[:2]) -> CheckedItem:
 
 
 def check_packages(required: Mapping[str, list[str]]) -> Iterator[CheckedItem]:
-    """Check the required packages, and the extras one by one.
-
-    Args:
-        required: requirements of each extra; those without an extra under "".
-    """
+    """Check the packages required by each extra, and without one (key "")."""
     packages = required.get("", [])
     versions, lacking = _installed(packages)
     if not packages:
@@ -153,9 +149,9 @@ def _version(package: str) -> str | None:
 
 
 def check_flights() -> CheckedItem:
-    """Import what flights in one process need, and resolve the default flight without flying it."""
+    """Resolve the default flight without flying it."""
     try:
-        from ..flight.plan import Scenario, resolve
+        from .flight.plan import Scenario, resolve
 
         plan = resolve(Scenario()).options
     except Exception as error:  # whatever fails here would end a flight
@@ -170,7 +166,7 @@ def check_kernels() -> CheckedItem:
     """Check the folder of compiled kernels, and if those of this version are there."""
     from space_robot_msgs_py.compiled.cache import cache_directory
 
-    from ..flight.compilation import MARK, mark_file
+    from .flight.compilation import MARK, mark_file
 
     folder, is_compiled = cache_directory(), mark_file(MARK).exists()
     values = {"folder": str(folder), "is_compiled": is_compiled}
@@ -261,10 +257,7 @@ def measure_lateness() -> dict[str, Any]:
 
 
 def check_deadlines(lateness: Mapping[str, Any]) -> CheckedItem:
-    """Judge a measurement: can a flight with ``--realtime`` keep this period here?
-
-    It can if 99 % of the ticks end within a period of their deadline, and no time is lost.
-    """
+    """Judge a measurement: 99 % of the ticks must end within a period of their deadline."""
     period = lateness["period_s"]
     names = {"median_s": "median", "percentile_99_s": "99 %", "worst_s": "worst"}
     numbers = ", ".join(f"{1e6 * lateness[key]:.0f} us ({name})" for key, name in names.items())
@@ -299,7 +292,7 @@ def check_ros() -> Iterator[CheckedItem]:
 
 def check_distribution(file: str, environment: Mapping[str, str]) -> CheckedItem:
     """Check which ROS 2 the rclpy of a file belongs to, by ``ROS_DISTRO`` of ``setup.bash``."""
-    from ..flight.graph.processes import has_ros2_run
+    from .flight.graph.processes import has_ros2_run
 
     wheel = _version(WHEEL)
     distribution = environment.get("ROS_DISTRO") or (DISTRIBUTION if wheel else "unknown")
@@ -335,12 +328,8 @@ def check_middleware(identifier: str, environment: Mapping[str, str]) -> Checked
 
 
 def check_domain(number: int | None = None) -> CheckedItem:
-    """Check the ROS domain that a flight would take now; it is taken and released.
-
-    Args:
-        number: a domain; None: ``ROS_DOMAIN_ID``, or a free one.
-    """
-    from ..flight.graph.domain import domain_asked_for, is_quiet, ros_domain
+    """Take and release a ROS domain, as a flight does; None: ``ROS_DOMAIN_ID``, or a free one."""
+    from .flight.graph.domain import domain_asked_for, is_quiet, ros_domain
 
     asked = domain_asked_for(number)
     try:
@@ -357,12 +346,8 @@ def check_domain(number: int | None = None) -> CheckedItem:
 
 
 def check_tools(search_path: str | None = None) -> Iterator[CheckedItem]:
-    """Check the compilers of flight code, the cross compilers with emulators, and the browser.
-
-    Args:
-        search_path: folders separated by colons; None: ``PATH``.
-    """
-    from ..export.verify import CROSS, EMULATORS
+    """Check compilers, cross compilers with emulators, and browser; None: those of ``PATH``."""
+    from .export.folder import CROSS, EMULATORS
 
     yield _check_compilers(search_path)
     for processor, compiler in CROSS.items():

@@ -1,4 +1,4 @@
-"""The command ``space-robot robot``: show the model read from a robot's file."""
+"""The commands ``space-robot robot`` and ``urdf``: a robot's model shown, and as a URDF."""
 
 from __future__ import annotations
 
@@ -10,17 +10,12 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from .completed_names import names_in
+from ..console.tables import Column, Group, Table, named
+from .option_types import names_in
 from .options import BASE, REPAIR, file_option, flight_options
 
 if TYPE_CHECKING:
-    from rich.console import Console
-
     from space_robot_model.robot.urdf_xml import Finding
-
-    from ..console.tables import Table
-
-SECTION = "Robots, missions and own pieces"
 
 
 @click.command()
@@ -55,8 +50,7 @@ def robot(robot: str, base: str | None, repair: bool, out: Path | None, as_json:
     from space_robot_msgs_py.errors import InputError
 
     from ..console.files import write_text
-    from ..console.terminal import echo_json, terminal
-    from ..console.terminal_tables import print_table
+    from ..console.terminal import echo_json, print_table, terminal
 
     _, own_base, is_repaired = split_choice(robot)
     base, repair = base or own_base, repair or is_repaired
@@ -80,16 +74,47 @@ def robot(robot: str, base: str | None, repair: bool, out: Path | None, as_json:
     if as_json:
         echo_json({"file": str(file), **description, "defects": defects})
     else:
-        _print_robot(description, findings, terminal())
+        _print_robot(description, findings)
 
 
-def _print_robot(
-    description: dict[str, Any], findings: Sequence[Finding], console: Console
-) -> None:
-    from ..console.terminal import say
-    from ..console.terminal_tables import print_table
+@click.command()
+@click.argument("robot", default="paper", shell_complete=names_in("robots"))
+@BASE
+@REPAIR
+@file_option("--out", help="Write it to a file, in place of standard output.")
+def urdf(robot: str, base: str | None, repair: bool, out: Path | None) -> None:
+    """Export a robot as a URDF, for RViz, Pinocchio, MuJoCo and other tools.
 
-    passive = len(description["passive_names"])
+    ROBOT is a name, a URDF, a xacro (where xacro is installed), a YAML file or a folder. Frames
+    are those of /tf: the base's is at its centre of mass, those of joints have the axis as z. What
+    has no shapes gets some that are drawn from its joints and masses.
+
+    \b
+    Examples:
+      space-robot urdf paper --out paper.urdf
+      space-robot urdf my_robot/ --out my_robot.urdf
+      space-robot urdf published.urdf --repair --base satellite --out mended.urdf
+    """
+    from space_robot_model.robot.find import robot_as_path, robot_source
+    from space_robot_model.robot.urdf_text import urdf_text
+
+    from ..console.files import write_text
+
+    source = robot_source(robot_as_path(robot), base, repair)
+    for line in source.findings:
+        click.echo(f"repaired: {line}", err=True)
+    text = urdf_text(source.robot)
+    if out is None:
+        click.echo(text, nl=False)
+        return
+    write_text(text, out, replace=True)
+    click.echo(f"wrote {out}", err=True)
+
+
+def _print_robot(description: dict[str, Any], findings: Sequence[Finding]) -> None:
+    from ..console.terminal import print_table, say, terminal
+
+    console, passive = terminal(), len(description["passive_names"])
     say(
         console,
         f"robot {description['name']}: {description['mass']:g} kg, "
@@ -105,39 +130,23 @@ def _print_robot(
 
 
 def _defects(findings: Sequence[Finding], heading: str) -> Table:
-    from ..console.tables import Column, Table
-
-    labels = (Column(name, is_label=True) for name in ("part", "defect", "given", heading))
+    columns = Column("line", spec="d"), *map(named, ("part", "defect", "given", heading))
     rows = [[f.line, f.part, f.defect, f.value, f.repair] for f in findings]
-    return Table.of("Defects", [Column("line", spec="d"), *labels], rows)
+    return Table.of("Defects", columns, rows)
 
 
 def _tables(description: dict[str, Any]) -> Iterator[Table]:
-    from ..console.tables import Column, Group, Table
-
-    def label(name: str) -> Column:
-        return Column(name, is_label=True)
-
-    columns = [label("body"), label("moved by"), Column("mass", "kg", ".6g"), Column("CoM", "m")]
-    rows: list[list[Any]] = [
-        [
-            b["name"],
-            b["joint"] or "-",
-            b["mass"],
-            _vector(b["com"]),
-            _vector(b["principal_moments"]),
-        ]
-        for b in description["bodies"]
-    ]
     note = "With all that is fixed to it; its frame is its joint's, whose axis is z."
-    columns.append(Column("principal moments", "kg m2"))
-    yield Table("Bodies", columns, [Group(rows)], [note])
+    columns = [named("body"), named("moved by"), Column("mass", "kg", ".6g"), Column("CoM", "m")]
+    rows: list[list[Any]] = []
+    for body in description["bodies"]:
+        vectors = _vector(body["com"]), _vector(body["principal_moments"])
+        rows.append([body["name"], body["joint"] or "-", body["mass"], *vectors])
+    yield Table.of("Bodies", [*columns, Column("principal moments", "kg m2")], rows, note)
 
     joints = description["joints"]
     cells = {
-        "joint": [joint["name"] for joint in joints],
-        "kind": [joint["kind"] for joint in joints],
-        "parent": [joint["parent"] for joint in joints],
+        **{key: [joint[key] for joint in joints] for key in ("name", "kind", "parent")},
         "range": [_range(joint) for joint in joints],
         "velocity": [_limit(joint, "velocity") for joint in joints],
         "effort": [_limit(joint, "effort") for joint in joints],
@@ -149,41 +158,36 @@ def _tables(description: dict[str, Any]) -> Iterator[Table]:
         "In this order in all arrays. deg and N m, or m and N of prismatic joints; friction: "
         "Coulomb and viscous; spring: stiffness, damping and rest; -: not given."
     )
-    columns = [Column(name, is_label=name in ("joint", "kind", "parent")) for name in cells]
-    yield Table("Joints", columns, [Group([*zip(*cells.values(), strict=True)])], [note])
+    columns = [named("joint"), named("kind"), named("parent"), *map(Column, [*cells][3:])]
+    yield Table.of("Joints", columns, [*zip(*cells.values(), strict=True)], note)
 
     if rows := [_drive(joint) for joint in joints if "drive" in joint]:
         names = ("gear ratio", "rotor inertia", "reflected", "stiffness", "damping")
-        columns = [label("joint"), *map(Column, names), label("encoder")]
         note = (
             "Motors on the parent, behind a gear and a spring. Stiffness and damping on the "
             "link's side; reflected: the rotor's inertia there, times the ratio squared; encoder: "
             "the side that is measured."
         )
-        yield Table("Drives", columns, [Group(rows)], [note])
+        columns = [named("joint"), *map(Column, names), named("encoder")]
+        yield Table.of("Drives", columns, rows, note)
 
-    columns = [label("tool"), label("body"), Column("place", "m")]
+    columns = [named("tool"), named("body"), Column("place", "m")]
     rows = [
         [tool["name"], tool["body"], _vector(tool["position"])] for tool in description["tools"]
     ]
-    yield Table("Tools", columns, [Group(rows)], ["The first one is that of tool_pose."])
+    yield Table.of("Tools", columns, rows, "The first one is that of tool_pose.")
 
-    if description["shapes"]:
-        columns = [label("body"), label("shape"), Column("size", "m"), label("mesh")]
-        rows = [
-            [
-                shape["body"],
-                shape["shape"],
-                _vector(shape["size"]),
-                shape.get("mesh", "") + ("" if shape.get("found", True) else " (missing)"),
-            ]
-            for shape in description["shapes"]
-        ]
+    rows = []
+    for shape in description["shapes"]:
+        mesh = shape.get("mesh", "") + ("" if shape.get("found", True) else " (missing)")
+        rows.append([shape["body"], shape["shape"], _vector(shape["size"]), mesh])
+    if rows:
+        columns = [named("body"), named("shape"), Column("size", "m"), named("mesh")]
         yield Table.of("Shapes", columns, rows)
 
     plates = description["plates"]
     if plates["count"]:
-        columns = [label("body"), Column("plates", spec="d"), Column("area", "m2", ".4g")]
+        columns = [named("body"), Column("plates", spec="d"), Column("area", "m2", ".4g")]
         rows = [[body["name"], body["count"], body["area"]] for body in plates["bodies"]]
         total = ["together", plates["count"], plates["area"]]
         origin = "those of the file" if plates["source"] == "file" else "made from the shapes"
