@@ -20,7 +20,7 @@ ROOMS = {
     "space_robot_control": "laws navigation allocation controller flight_code controller_node "
     "guidance mission_node",
     "space_robot": "console processes scenario tuning flight export analysis view api learning "
-    "campaign paper doctor help cli __main__",
+    "campaign choice paper doctor help cli __main__",
 }
 """Of each package, from the ground up: a room imports only from rooms that stand before it."""
 VAGUE = {"found", "given", "told"}

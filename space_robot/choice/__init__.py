@@ -6,12 +6,12 @@
 | `trials` | flights of a gain set with a light and a heavy robot, and its score |
 | `front` | the search for the least error at each ripple |
 | `candidates` | one gain set a law, flown with many draws; who is out, and the ranks |
-| `choose` | all of it for a scenario |
+| `recommend` | all of it for a scenario |
 | `gain_files`, `report` | its gains, campaign, tables, JSON and page |
 | `new_robot`, `robot_files` | the folder of a new robot, with the law chosen for it |
 """
 
-from .choose import Choice, ChoiceOptions, choose
+from .recommend import ChoiceOptions, Recommendation, recommend
 from .trials import Uncertainty
 
-__all__ = ["Choice", "ChoiceOptions", "Uncertainty", "choose"]
+__all__ = ["ChoiceOptions", "Recommendation", "Uncertainty", "recommend"]

@@ -11,13 +11,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..analysis.words import limit_cycles
+from ..analysis.words import Metrics, limit_cycles
 from ..campaign.draws import Draws
 from ..campaign.study import Study
 from ..campaign.verdicts.laws import PairedComparison, compare
 from ..flight.batch import FlightBatch, batches
 from ..processes.executor import run_all
-from .criteria import CRITERIA, Criterion, Metrics, is_error
+from .criteria import CRITERIA, Criterion, is_error
 from .search_space import GainPoint
 from .trials import Score, alone
 
@@ -25,7 +25,7 @@ Array = NDArray[np.float64]
 
 OFTEN = 0.1
 """Share of the flights with a limit cycle, or ended early, from which on a law is out."""
-SATURATED = 0.05
+MOST_SATURATION = 0.05
 """Largest median share of ticks with a wheel at its limit."""
 HELD = 0.5
 """Largest median share of its way on which friction may hold a joint."""
@@ -46,7 +46,7 @@ class Candidate(NamedTuple):
     """Its gain files."""
 
 
-class Task(NamedTuple):
+class CandidateRuns(NamedTuple):
     """Some runs of a law."""
 
     law: str
@@ -98,7 +98,7 @@ class FlownCandidate:
         if any(any(_of(flight, ".beyond_effort").values()) for flight in flown):
             return "joints beyond their limits of effort"
         share = float(np.median([flight.get("wheels.saturation", 0.0) for flight in flown]))
-        if share > SATURATED:
+        if share > MOST_SATURATION:
             return f"wheels at their limit in {share:.0%} of the ticks"
         for name in _of(flown[0], ".standing"):
             held = float(np.median([flight.get(f"{name}.standing", 0.0) for flight in flown]))
@@ -130,7 +130,7 @@ def fly_candidates(
     laws = [f"{c.controller}={c.folder}" for c in candidates]
     text = study.model_copy(update={"laws": laws}).model_dump_json(by_alias=True)
     groups = [tuple(range(k, min(k + GROUP, runs))) for k in range(0, runs, GROUP)]
-    tasks = [Task(law, group) for group in groups for law in laws]
+    tasks = [CandidateRuns(law, group) for group in groups for law in laws]
     flown = run_all(partial(_fly, text, seed, runs, criterion), tasks, workers, progress)
     by_law: dict[str, list[dict[str, float]]] = {law: [] for law in laws}
     for task, flights in zip(tasks, flown, strict=True):
@@ -158,7 +158,9 @@ def comparisons(order: Sequence[FlownCandidate], criterion: Criterion) -> list[P
     ]
 
 
-def _fly(text: str, seed: int, runs: int, criterion: str, task: Task) -> list[dict[str, float]]:
+def _fly(
+    text: str, seed: int, runs: int, criterion: str, task: CandidateRuns
+) -> list[dict[str, float]]:
     draws = _draws(text, seed, runs)
     flights = [draws.flight(run, task.law) for run in task.runs]
     metrics: list[dict[str, float]] = [{} for _ in flights]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from fnmatch import fnmatchcase
 from typing import NamedTuple
 
@@ -11,8 +11,7 @@ from space_robot_msgs_py.bag.flight_log import FlightLog
 
 from ..analysis.analysed_log import AnalysedLog
 from ..analysis.measure import evaluate, names
-
-Metrics = Mapping[str, float]
+from ..analysis.words import Metrics
 
 
 class Criterion(NamedTuple):
@@ -35,7 +34,7 @@ class Criterion(NamedTuple):
         return evaluate(flight, known)[0]
 
 
-def tracking_error(metrics: Metrics) -> float:
+def mean_error(metrics: Metrics) -> float:
     """Return the geometric mean of the RMS errors of attitude and of each group of joints."""
     errors = [value for name, value in metrics.items() if is_error(name)]
     return math.exp(sum(math.log(max(error, 1e-300)) for error in errors) / len(errors))
@@ -60,7 +59,7 @@ def _wheel_motion(metrics: Metrics) -> float:
 
 CRITERIA = {
     "tracking": Criterion(
-        "geometric mean of the RMS errors of attitude and joints", tracking_error, tracking_error
+        "geometric mean of the RMS errors of attitude and joints", mean_error, mean_error
     ),
     "pointing": Criterion("RMS error of the attitude", _attitude, _attitude),
     "tool": Criterion("RMS error of the tool's position", _tool, _tool, ("tool_position.rms",)),
@@ -68,7 +67,7 @@ CRITERIA = {
         "motion of the base's torque up and down, which wears wheels, among laws with at most "
         "three times the least tracking error",
         _wheel_motion,
-        tracking_error,
+        mean_error,
         ("base_torque.variation",),
         near=3.0,
     ),

@@ -35,7 +35,7 @@ FIRST_STEP, NEXT_STEP = 0.15, 0.08
 range of a coordinate."""
 FAILED = 100.0
 """Objective of a gain set that did not fly to the end, less its share of the flight."""
-SATURATED = 20.0
+SATURATION_WEIGHT = 20.0
 """Weight of the share of ticks with a wheel at its limit, beyond `ALLOWED_SATURATION`."""
 ALLOWED_SATURATION = 0.01
 
@@ -103,7 +103,7 @@ def objective(score: Score, weight: float) -> float:
     if score.flown < 1.0:
         return FAILED - score.flown
     value = (1.0 - weight) * math.log(score.error) + weight * math.log(max(score.ripple, 1e-12))
-    value += SATURATED * max(0.0, score.saturation - ALLOWED_SATURATION)
+    value += SATURATION_WEIGHT * max(0.0, score.saturation - ALLOWED_SATURATION)
     return value + (FAILED / 2.0 if score.beyond else 0.0)
 
 

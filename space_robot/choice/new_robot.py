@@ -27,7 +27,7 @@ from space_robot_sim.environment.environment import EnvironmentSettings
 from ..console.files import atomic_folder
 from ..tuning.gain_file import estimate_remark
 from ..tuning.task import force_demand
-from .choose import Choice, ChoiceOptions, Progress, choose
+from .recommend import ChoiceOptions, Recommendation, ShowSteps, recommend
 from .report import campaign_text
 from .robot_files import CAMPAIGN_FILE, ROBOT_FILE
 
@@ -128,7 +128,7 @@ class NewRobot:
     folder: Path
     robot: Robot
     mission: MissionSettings
-    choice: Choice
+    choice: Recommendation
     remarks: tuple[str, ...] = ()
     """Remarks on weak laws, on tools and joints that may be passive, in sentences."""
 
@@ -161,7 +161,7 @@ def make_robot(
     robot: Robot,
     folder: Path,
     command: str,
-    progress: Progress,
+    progress: ShowSteps,
     options: ChoiceOptions = SHORT,
 ) -> NewRobot:
     """Create the folder of a robot, and choose the law that it flies.
@@ -184,7 +184,7 @@ def make_robot(
         mission = rest_to_rest(robot)
         (place / OWN_MISSION).write_text(mission_text(robot, mission, command), "utf-8")
         gains = place / OWN_GAINS
-        choice, tuned = choose({"robot": str(place), **TRIAL}, gains, options, command, progress)
+        choice, tuned = recommend({"robot": str(place), **TRIAL}, gains, options, command, progress)
         if choice.law:
             choice.install(gains, gains)
         own = replace(choice, scenario={**choice.scenario, "robot": f"{folder}/"})

@@ -18,23 +18,23 @@ from ..console.files import make_folder, write_text
 from ..console.tables import Column, Group, JudgedCell, Table
 from ..console.terminal import json_text
 from ..processes.software import versions
-from .choose import Choice
 from .criteria import CRITERIA
 from .front import Front
+from .recommend import Recommendation
 
 CAMPAIGN = "campaign.yaml"
 CAMPAIGN_LAWS, CAMPAIGN_RUNS = 4, 200
 """Laws and runs of the campaign that continues the comparison."""
-SHARES = (0.001, 0.003, 0.01, 0.03, 0.1)
+RIPPLES = (0.001, 0.003, 0.01, 0.03, 0.1)
 """Ripples at which the table of fronts shows errors."""
 
 
-def candidates_table(choice: Choice, notes: Sequence[str] = ()) -> Table:
+def candidates_table(choice: Recommendation, notes: Sequence[str] = ()) -> Table:
     """Return the laws, the best one first, with what their candidates flew."""
     criterion = CRITERIA[choice.options.criterion]
     order = {each.law: number for number, each in enumerate(choice.order, 1)}
     flown = {each.law: each for each in choice.flown}
-    found = {c.other: c for c in choice.compared}
+    comparisons = {c.other: c for c in choice.compared}
     rows: list[list[Any]] = []
     for law in sorted(choice.fronts, key=lambda law: (order.get(law, math.inf), law)):
         each = flown.get(law)
@@ -50,9 +50,9 @@ def candidates_table(choice: Choice, notes: Sequence[str] = ()) -> Table:
             verdict = JudgedCell("", "chosen", "good")
         elif law in choice.out:
             verdict = JudgedCell(choice.out[law], "out", "bad")
-        elif law in found:
-            word = {"better": "worse", "worse": "better"}.get(found[law].finding, "alike")
-            verdict = JudgedCell(f"{1.0 / found[law].ratio.value:.3g} times", word, "open")
+        elif law in comparisons:
+            word = {"better": "worse", "worse": "better"}.get(comparisons[law].finding, "alike")
+            verdict = JudgedCell(f"{1.0 / comparisons[law].ratio.value:.3g} times", word, "open")
         else:
             verdict = JudgedCell("too far from the least error", "out", "bad")
         rows.append([order.get(law), law, *numbers, verdict])
@@ -68,20 +68,20 @@ def candidates_table(choice: Choice, notes: Sequence[str] = ()) -> Table:
     return Table(title, columns, [Group(rows)], notes)
 
 
-def fronts_table(choice: Choice) -> Table:
+def fronts_table(choice: Recommendation) -> Table:
     """Return the least error of each law at some ripples."""
     rows = [
-        [law, *(_finite(front.error_at(share)) for share in SHARES)]
+        [law, *(_finite(front.error_at(share)) for share in RIPPLES)]
         for law, front in choice.fronts.items()
     ]
     columns = [
         Column("law", is_label=True),
-        *(Column(f"ripple {share:.1%}", "", ".3g") for share in SHARES),
+        *(Column(f"ripple {share:.1%}", "", ".3g") for share in RIPPLES),
     ]
     return Table.of("Least error in the trials with a ripple of at most", columns, rows)
 
 
-def report(choice: Choice) -> dict[str, Any]:
+def report(choice: Recommendation) -> dict[str, Any]:
     """Return a choice as data for JSON."""
     options = choice.options
     return {
@@ -124,7 +124,7 @@ def report(choice: Choice) -> dict[str, Any]:
     }
 
 
-def campaign_text(choice: Choice, folder: Path, command: str) -> str:
+def campaign_text(choice: Recommendation, folder: Path, command: str) -> str:
     """Return a campaign of the best laws, which continues the comparison."""
     laws = [f"{each.law}={folder / each.law}/" for each in choice.order[:CAMPAIGN_LAWS]]
     study = {
@@ -164,7 +164,7 @@ def fronts_figure(fronts: Mapping[str, Front], chosen: str = "") -> Figure:
     return figure
 
 
-def write_report(choice: Choice, folder: Path, command: str) -> Path:
+def write_report(choice: Recommendation, folder: Path, command: str) -> Path:
     """Write page, figure, JSON and campaign; return the page.
 
     Raises:

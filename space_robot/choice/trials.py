@@ -19,19 +19,20 @@ from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.config.files import merge
 from space_robot_msgs_py.errors import FlightError
 
+from ..analysis.words import Metrics
 from ..api import Scenario
 from ..campaign.draws.nominal import Nominal, Variation
 from ..campaign.draws.paths import Path, Unavailable, value_at
 from ..flight.batch import FlightBatch, batches
 from ..flight.plan import Flight
 from ..flight.simulate import simulate
-from .criteria import Criterion, Metrics
+from .criteria import Criterion
 from .search_space import GainPoint
 
 Array = NDArray[np.float64]
 
 
-class Corner(NamedTuple):
+class Deviation(NamedTuple):
     """Factors on the numbers of a nominal flight."""
 
     mass: float
@@ -50,12 +51,12 @@ class Uncertainty:
     latency_ticks: int = 1
 
     @property
-    def corners(self) -> tuple[Corner, Corner]:
+    def deviations(self) -> tuple[Deviation, Deviation]:
         """The light robot and the heavy one."""
         mass, scale, friction = self.mass, self.torque_scale, self.friction
         return (
-            Corner(1.0 - mass, 1.0 + scale, 1.0 - friction, self.latency_ticks),
-            Corner(1.0 + mass, 1.0 - scale, 1.0 + friction, 0),
+            Deviation(1.0 - mass, 1.0 + scale, 1.0 - friction, self.latency_ticks),
+            Deviation(1.0 + mass, 1.0 - scale, 1.0 + friction, 0),
         )
 
     def vary(self, own_friction: bool) -> dict[str, Any]:
@@ -131,7 +132,7 @@ class Trials:
         self.nominal = Nominal(scenario)
         self.law = self.nominal.resolved.law
         self._torques, self._criterion = torques, criterion
-        self._variations = [self._variation(corner) for corner in uncertainty.corners]
+        self._variations = [self._variation(corner) for corner in uncertainty.deviations]
 
     def fly(self, points: Sequence[GainPoint]) -> list[Score]:
         """Fly the trials of several gain sets in lanes, and score each."""
@@ -154,7 +155,7 @@ class Trials:
             for k in range(0, len(logs), count)
         ]
 
-    def _variation(self, corner: Corner) -> Variation:
+    def _variation(self, corner: Deviation) -> Variation:
         tree, changed = self.nominal.tree, dict[Path, Any]()
         robot = tree["robot"]
         bodies = [("base",), *(("links", name) for name in robot["links"])]

@@ -99,8 +99,7 @@ def choose(
     """
     from space_robot_model.robot.find import robot_as_path, robot_files
 
-    from ..choice import ChoiceOptions, Uncertainty
-    from ..choice import choose as find_law
+    from ..choice import ChoiceOptions, Uncertainty, recommend
     from ..choice.report import CAMPAIGN, candidates_table, report, write_report
     from ..console.progress import counting_progress
     from ..console.terminal import echo_json, print_table, terminal
@@ -127,7 +126,7 @@ def choose(
     )
     command = shlex.join(["space-robot", "choose", *context.meta[WORDS]])
     compile_lanes()
-    choice, _ = find_law(scenario, folder, wanted, command, counting_progress)
+    choice, _ = recommend(scenario, folder, wanted, command, counting_progress)
     page = write_report(choice, folder, command)
     chosen = choice.install(folder, files.gains) if is_own and files.gains and choice.law else None
     if as_json:

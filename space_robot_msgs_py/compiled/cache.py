@@ -58,7 +58,7 @@ def _imported_constants(
     kernels: Iterable[Path], texts: Mapping[Path, bytes], root: Path
 ) -> list[bytes]:
     """Return the definitions of the constants that modules import, and of those in them."""
-    found: set[bytes] = set()
+    definitions: set[bytes] = set()
     waiting = [(source, frozenset[bytes]()) for source in kernels]
     seen = set(waiting)
     while waiting:
@@ -66,7 +66,7 @@ def _imported_constants(
         names = set(asked)
         for constants, values in _CONSTANT.findall(texts[source]):
             if not asked.isdisjoint(_NAME.findall(constants)):
-                found.add(constants + values)
+                definitions.add(constants + values)
                 names.update(_NAME.findall(values))
         needed = [(source, frozenset(names))] if asked else []
         needed += [
@@ -76,7 +76,7 @@ def _imported_constants(
         new = [each for each in needed if each[1] and each not in seen]
         seen.update(new)
         waiting += new
-    return sorted(found)
+    return sorted(definitions)
 
 
 def _imports(

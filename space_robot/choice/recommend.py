@@ -33,7 +33,7 @@ from .search_space import GainPoint, SearchSpace
 from .trials import Trials, Uncertainty
 
 Array = NDArray[np.float64]
-Progress = Callable[[str], AbstractContextManager[Callable[[int], Callable[[], None]]]]
+ShowSteps = Callable[[str], AbstractContextManager[Callable[[int], Callable[[], None]]]]
 """Shows a step by its description, see `console.progress.counting_progress`."""
 
 INITIAL_TUNING = TuningOptions(margin=0.05, mass_uncertainty=0.2, h_bar=AUTO)
@@ -64,7 +64,7 @@ class ChoiceOptions:
 
 
 @dataclass(frozen=True)
-class Choice:
+class Recommendation:
     """What was found."""
 
     scenario: Mapping[str, Any]
@@ -130,13 +130,13 @@ class Choice:
         return install(folder, [self.law, *others], self.law, gains)
 
 
-def choose(
+def recommend(
     scenario: Mapping[str, Any],
     folder: Path,
     options: ChoiceOptions,
     command: str,
-    progress: Progress,
-) -> tuple[Choice, Tuned]:
+    progress: ShowSteps,
+) -> tuple[Recommendation, Tuned]:
     """Search the front of each law, fly a candidate of each with many draws, and rank them.
 
     Args:
@@ -165,11 +165,11 @@ def choose(
     friction = coefficients(known, nominal.plant_settings.friction)[: known.n]
     search = replace(search, torques=torques_of(nominal), friction=friction)
     with progress("fronts of the laws") as begin:
-        found = run_all(search, names, min(options.workers, len(names)), begin)
-    fronts = {front.law: front for front in found}
+        searched = run_all(search, names, min(options.workers, len(names)), begin)
+    fronts = {front.law: front for front in searched}
     out: dict[str, str] = {}
     candidates = []
-    for law, front in zip(names, found, strict=True):
+    for law, front in zip(names, searched, strict=True):
         controller = Law.parse(law).controller
         tried = front.within(options.ripple)
         if tried is None:
@@ -187,7 +187,9 @@ def choose(
     order = ranked(flown, criterion)
     out |= {each.law: each.reason for each in flown if each.reason}
     compared = comparisons(order, criterion) if order else []
-    found_law = Choice(dict(scenario), options, fronts, flown, order, compared, out, study.vary)
+    found_law = Recommendation(
+        dict(scenario), options, fronts, flown, order, compared, out, study.vary
+    )
     return found_law, tuned
 
 
@@ -238,8 +240,7 @@ class _Search:
 
     def __call__(self, law: str) -> Front:
         """Return the front of a law."""
-        options, given = self.options, Scenario(**self.options_of(law))
-        flight = given.check()
+        options, flight = self.options, Scenario(**self.options_of(law)).check()
         duration = min(flight.ticks * flight.period, options.longest_s)
         trials = Trials(
             Scenario(**{**self.options_of(law), "duration": duration}),
