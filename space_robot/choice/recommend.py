@@ -16,6 +16,7 @@ from space_robot_msgs_py.errors import InputError
 from space_robot_sim.environment.friction import coefficients
 
 from ..analysis.analysed_log import AnalysedLog
+from ..analysis.torques import SHORTEST_S
 from ..api import Scenario
 from ..campaign.gain_set import tuned_set, write_set
 from ..campaign.study import Law, Study
@@ -50,7 +51,7 @@ class ChoiceOptions:
     """Largest ripple of the torques, as a share of the largest one in the mission."""
     laws: tuple[str, ...] = ()
     """That take part, also ``file.py:Class``; empty: all of this project."""
-    evaluations: int = 240
+    evaluations: int = 160
     """Gain sets tried for each law."""
     weights: tuple[float, ...] = RIPPLE_WEIGHTS
     """Of the ripple in the search, see `front`."""
@@ -103,7 +104,7 @@ class Recommendation:
         parts = []
         if worse:
             ratio = 1.0 / next(c.ratio.value for c in self.compared if c.other == worse[0])
-            parts.append(f"{worse[0]}, the next one, has {ratio:.2g} times as much")
+            parts.append(f"{worse[0]}, the next one, has {ratio:.3g} times as much")
         if alike:
             parts.append(f"{' and '.join(alike)} cannot be told from it")
         return f"{text}; {'; '.join(parts)}."
@@ -163,6 +164,8 @@ def recommend(
     nominal = Scenario(**search.options_of(names[0])).check()
     known = nominal.scenario.robots.controller
     friction = coefficients(known, nominal.plant_settings.friction)[: known.n]
+    if (duration := nominal.ticks * nominal.period) < SHORTEST_S:
+        raise InputError(f"a choice needs {SHORTEST_S:g} s of flight or more, got {duration:g} s")
     search = replace(search, torques=torques_of(nominal), friction=friction)
     with progress("fronts of the laws") as begin:
         searched = run_all(search, names, min(options.workers, len(names)), begin)

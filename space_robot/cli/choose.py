@@ -47,7 +47,7 @@ from .options import flight_options, folder_option
 @click.option(
     "--evaluations",
     type=click.IntRange(1, 100_000),
-    default=240,
+    default=160,
     show_default=True,
     help="Gain sets to try for each law.",
 )
