@@ -1,11 +1,13 @@
 """The front of a law: its least error for each ripple, over all its gains.
 
-CMA-ES (Hansen, The CMA evolution strategy: a tutorial, arXiv:1604.00772; package `cma`) minimises
+CMA-ES (Hansen, The CMA evolution strategy: a tutorial, arXiv:1604.00772; package `cma`) first
+minimises the error with the ripple that the user allows,
 
-    (1 - w) log(error) + w log(ripple)
+    log(error) + 2 max(0, log(ripple / allowed)),
 
-for a few weights w, one after the other, each from the best point known. Every gain set that was
-tried is kept: the front is those which no other beats in error and ripple both.
+then, for the rest of the front, ``(1 - w) log(error) + w log(ripple)`` for some weights w, each
+from the best point known. Every gain set that was tried is kept: the front is those which no other
+beats in error and ripple both.
 """
 
 from __future__ import annotations
@@ -24,8 +26,12 @@ from .trials import Score, Trials
 
 Array = NDArray[np.float64]
 
-RIPPLE_WEIGHTS = (0.2, 0.5, 0.8)
+RIPPLE_WEIGHTS = (0.5, 0.8)
 """Weights of the ripple, from fast laws to smooth ones."""
+FIRST_PART = 0.5
+"""Share of the gain sets for the least error with the ripple allowed."""
+EXCESS_WEIGHT = 2.0
+"""Weight of the logarithm of the ripple beyond what is allowed."""
 POPULATION = 8
 """Gain sets of a generation: two batches of lanes, with two trials each."""
 FIRST_DESIGN = 16
@@ -98,18 +104,31 @@ def is_acceptable(score: Score) -> bool:
     return score.is_flyable and score.saturation <= ALLOWED_SATURATION
 
 
-def objective(score: Score, weight: float) -> float:
-    """Return what is minimised, see the module."""
+def least_error(score: Score, allowed: float) -> float:
+    """Return what is minimised for the least error with a ripple, see the module."""
+    return _or_failed(
+        score, lambda error, ripple: error + EXCESS_WEIGHT * max(0.0, ripple - math.log(allowed))
+    )
+
+
+def weighted(score: Score, weight: float) -> float:
+    """Return what is minimised for a weight of the ripple, see the module."""
+    return _or_failed(score, lambda error, ripple: (1.0 - weight) * error + weight * ripple)
+
+
+def _or_failed(score: Score, value: Callable[[float, float], float]) -> float:
+    """Return a value of the logarithms of error and ripple; more if limits are exceeded."""
     if score.flown < 1.0:
         return FAILED - score.flown
-    value = (1.0 - weight) * math.log(score.error) + weight * math.log(max(score.ripple, 1e-12))
-    value += SATURATION_WEIGHT * max(0.0, score.saturation - ALLOWED_SATURATION)
-    return value + (FAILED / 2.0 if score.beyond else 0.0)
+    number = value(math.log(score.error), math.log(max(score.ripple, 1e-12)))
+    number += SATURATION_WEIGHT * max(0.0, score.saturation - ALLOWED_SATURATION)
+    return number + (FAILED / 2.0 if score.beyond else 0.0)
 
 
 def search_front(
     trials: Trials,
     space: SearchSpace,
+    allowed: float,
     evaluations: int,
     seed: int,
     weights: Sequence[float] = RIPPLE_WEIGHTS,
@@ -120,6 +139,7 @@ def search_front(
     Args:
         trials: that are flown with each gain set.
         space: of the gains.
+        allowed: ripple, as a share of the largest torque.
         evaluations: gain sets to try, in all.
         seed: of the search.
         weights: of the ripple, see the module.
@@ -138,8 +158,10 @@ def search_front(
 
     spread = qmc.Sobol(space.dimension, seed=np.random.default_rng(seed)).random(FIRST_DESIGN)
     fly([space.origin, *spread[1:]][:evaluations])
-    for number, weight in enumerate(weights):
-        begin = min(front.tried, key=lambda tried: objective(tried.score, weight))
+    goals: list[Callable[[Score], float]] = [partial(least_error, allowed=allowed)]
+    goals += [partial(weighted, weight=weight) for weight in weights]
+    for number, goal in enumerate(goals):
+        begin = min(front.tried, key=lambda tried: goal(tried.score))
         strategy = cma.CMAEvolutionStrategy(
             np.clip(begin.point, 0.02, 0.98),
             NEXT_STEP if number else FIRST_STEP,
@@ -151,10 +173,11 @@ def search_front(
                 "verbose": -9,
             },
         )
-        until = math.ceil(evaluations * (number + 1) / len(weights))
+        rest = (1.0 - FIRST_PART) / len(weights) if weights else 0.0
+        until = evaluations * (FIRST_PART + number * rest if weights else 1.0)
         while len(front.tried) < until and not strategy.stop():
             points = strategy.ask()
-            strategy.tell(points, [objective(s, weight) for s in fly(points)])
+            strategy.tell(points, [goal(score) for score in fly(points)])
     return front
 
 

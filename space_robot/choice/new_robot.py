@@ -31,10 +31,10 @@ from .recommend import ChoiceOptions, Recommendation, ShowSteps, recommend
 from .report import campaign_text
 from .robot_files import CAMPAIGN_FILE, ROBOT_FILE
 
-TRIAL: Mapping[str, Any] = {"case": "3", "sensors": "fine", "navigation": "filtered"}
+TRIAL: Mapping[str, Any] = {"case": "1", "sensors": "fine", "navigation": "filtered"}
 """Friction and hardware with which the laws are compared."""
-CONDITIONS = "friction, payload and disturbances of case 3, sensors fine and navigation filtered"
-SHORT = ChoiceOptions(evaluations=40, longest_s=8.0, runs=8, weights=(0.3,))
+CONDITIONS = "friction, sensors fine and navigation filtered"
+SHORT = ChoiceOptions(evaluations=64, longest_s=8.0, runs=4, weights=())
 """How the law is chosen: shorter than `space-robot choose` does."""
 
 Array = NDArray[np.float64]

@@ -160,6 +160,10 @@ def recommend(
     )
     write_set(tuned, command, folder / TUNED_SET)
     points, gains = tuned_points(tuned), f"{folder}/{TUNED_SET}"
+    for law in names:
+        kind = find_law(Law.parse(law).controller)
+        if "=" not in law and kind.name not in points:
+            raise InputError(f"law {law}: has no tuned gains: give some, {law}=GAINS")
     search = _Search(dict(scenario), gains, points, {}, np.empty((0, 2)), options)
     nominal = Scenario(**search.options_of(names[0])).check()
     known = nominal.scenario.robots.controller
@@ -196,10 +200,22 @@ def recommend(
     return found_law, tuned
 
 
+WITHOUT_PAYLOAD = "1"
+"""The case with friction alone."""
 TUNED_SET = "tuned"
 """Name of the set from which the search starts."""
 TUNED = ("robot", "mission", "sensors", "navigation", "orbit", "period", "parameters")
 """Options of a scenario that gains are tuned for."""
+
+
+def _tuned(options: Mapping[str, Any], case: str) -> Tuned:
+    """Tune for a case; where its payload leaves no margin at all, for the robot without one."""
+    try:
+        return tuned_set(options, [case], INITIAL_TUNING, lambda text: None)
+    except InputError:
+        if case == WITHOUT_PAYLOAD:
+            raise
+        return tuned_set(options, [WITHOUT_PAYLOAD], INITIAL_TUNING, lambda text: None)
 
 
 def has_estimate(law: str) -> bool:
@@ -252,7 +268,9 @@ class _Search:
             CRITERIA[options.criterion],
         )
         space = self.space(law)
-        return search_front(trials, space, options.evaluations, options.seed, options.weights)
+        return search_front(
+            trials, space, options.ripple, options.evaluations, options.seed, options.weights
+        )
 
     def options_of(self, law: str) -> dict[str, Any]:
         """Return the options of the scenario with a law."""
@@ -261,19 +279,14 @@ class _Search:
         return {**self.scenario, "controller": controller, "gains": own}
 
     def space(self, law: str) -> SearchSpace:
-        """Return the search space of a law.
-
-        Raises:
-            InputError: nothing is known of its gains.
-        """
+        """Return the search space of a law."""
         controller, has_base = Law.parse(law).controller, self.scenario.get("actuators") != "none"
         start = self.points.get(controller)
         if "=" in law:
             scenario = resolve(Scenario(**self.options_of(law)))
             corner = scenario.controller.acceleration_filter_hz
             start = GainPoint(scenario.law.gain_values, corner)
-        if start is None:
-            raise InputError(f"law {controller}: has no tuned gains: give some, {controller}=GAINS")
+        assert start is not None
         return SearchSpace(
             find_law(controller), start, self.friction, has_base, has_estimate(controller)
         )

@@ -46,7 +46,7 @@ INTEGRAL = Factor("integral", {"k_i": 1.0}, 1e-3, 0.5, is_common=True)
 FRICTION = Factor("friction fed forward", {"viscous": 1.0, "coulomb": 1.0}, 0.01, 1.5, True)
 """Share of the nominal friction."""
 DEAD_BAND = Factor("dead band", {"dead_band": 1.0}, 0.01, 100.0, is_common=True)
-DEAD_BAND_RATE = 1e-3
+DEAD_BAND_RATE = 1e-4
 """On which the factor of the dead band counts, rad/s or m/s."""
 FILTER = "low-pass of the estimate"
 """The one factor on a number of the set instead of a law's: its corner frequency."""
@@ -175,11 +175,11 @@ class SearchSpace:
 
     @property
     def origin(self) -> Array:
-        """The point (d,) of the start."""
+        """The point (d,) of the start, with the known friction fed forward."""
         origin: Array = -self._low / (self._high - self._low)
         for k, coordinate in enumerate(self.coordinates):
-            if any(not self.start.gains[name].any() for name in coordinate.powers):
-                origin[k] = 0.0
+            if "k_i" in coordinate.powers and not self.start.gains["k_i"].any():
+                origin[k] = 0.5  # in the middle of its range
         return np.clip(origin, 0.0, 1.0)
 
     def at(self, point: Array) -> GainPoint:

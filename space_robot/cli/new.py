@@ -162,7 +162,7 @@ def new() -> None:
 @click.option(
     "--evaluations",
     type=click.IntRange(1, 100_000),
-    default=40,
+    default=64,
     show_default=True,
     help="Gain sets to try for each law; 1: the tuned one alone.",
 )

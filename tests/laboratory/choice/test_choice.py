@@ -1,0 +1,139 @@
+"""The choice of a law: search space, fronts, candidates, files."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+from click.testing import CliRunner, Result
+from hypothesis import given
+from hypothesis import strategies as st
+
+from space_robot.choice.criteria import mean_error
+from space_robot.choice.front import Front, Tried
+from space_robot.choice.recommend import has_estimate
+from space_robot.choice.search_space import FASTEST_HZ, SLOWEST_HZ, GainPoint, SearchSpace
+from space_robot.choice.trials import Score
+from space_robot.cli.main import cli
+from space_robot.flight.plan import Scenario, resolve
+from space_robot_control.laws import find_law, laws
+from space_robot_msgs_py.errors import InputError
+
+FRICTION = np.array([[0.15, 0.8]] * 6)
+SHORT = ("--evaluations", "10", "--runs", "2", "--duration", "1.1", "--workers", "1")
+
+
+def choose(*words: str) -> Result:
+    return CliRunner().invoke(cli, ("choose", *words))
+
+
+def space(law: str, corner_hz: float = 30.0) -> SearchSpace:
+    gains = resolve(Scenario(controller=law, gains="tuned")).law.gain_values
+    start = GainPoint(gains, corner_hz)
+    return SearchSpace(find_law(law), start, FRICTION, True, has_estimate(law))
+
+
+@pytest.mark.parametrize("law", laws())
+def test_a_search_begins_at_the_tuned_gains_with_the_known_friction(law: str) -> None:
+    searched = space(law)
+    begun = searched.at(searched.origin)
+    for name, values in searched.start.gains.items():
+        if name in ("coulomb", "viscous"):
+            column = ("coulomb", "viscous").index(name)
+            np.testing.assert_allclose(begun.gains[name][3:], FRICTION[:, column])
+            assert not begun.gains[name][:3].any(), "the base has no friction"
+        elif name not in ("k_i", "dead_band"):
+            np.testing.assert_allclose(begun.gains[name], values, rtol=1e-12)
+    low, high = searched.at(np.zeros(searched.dimension)), searched.at(np.ones(searched.dimension))
+    if has_estimate(law):
+        assert low.corner_hz == pytest.approx(SLOWEST_HZ)
+        assert high.corner_hz == pytest.approx(FASTEST_HZ)
+
+
+def test_gains_of_one_bandwidth_move_as_its_powers_and_on_their_own_axes() -> None:
+    searched = space("ctc")
+    (base,) = (k for k, c in enumerate(searched.coordinates) if c.label == "base bandwidth")
+    coordinate, point = searched.coordinates[base], searched.origin
+    point[base] = 1.0
+    ratio = {name: searched.at(point).gains[name] / searched.start.gains[name] for name in KP_KD}
+    np.testing.assert_allclose(ratio["k_d"][:3], coordinate.highest)
+    np.testing.assert_allclose(ratio["k_p"][:3], coordinate.highest**2)
+    np.testing.assert_allclose([ratio[name][3:] for name in KP_KD], 1.0)
+
+
+KP_KD = ("k_p", "k_d")
+SHARES = st.floats(1e-6, 10.0)
+SCORES = st.builds(
+    Score,
+    SHARES,
+    SHARES,
+    st.sampled_from([0.0, 0.5]),
+    st.sampled_from([1.0, 0.3]),
+    st.booleans(),
+    st.just({}),
+)
+
+
+@given(st.lists(SCORES, max_size=30), SHARES)
+def test_nothing_tried_beats_the_front(scores: list[Score], ripple: float) -> None:
+    front = Front("ctc", [Tried(np.zeros(1), score) for score in scores])
+    able = [s for s in scores if s.flown == 1.0 and not s.beyond and s.saturation == 0.0]
+    for tried in front.best:
+        assert tried.score in able
+        assert not any(s.error < tried.score.error and s.ripple <= tried.score.ripple for s in able)
+    least = min((s.error for s in able if s.ripple <= ripple), default=np.inf)
+    assert front.error_at(ripple) == least
+
+
+def test_a_law_is_chosen_with_gains_that_fly_and_files_that_say_why(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    words = ("paper", "--law", "ctc", "--law", "tde_stc", *SHORT, "--json", "--ripple", "1")
+    result = choose(*words, "--out", "a")
+    assert result.exit_code == 0, result.exception
+    report = json.loads(result.stdout)
+    assert report["order"][0] == report["law"]
+    assert set(report["order"]) | set(report["out"]) == {"ctc", "tde_stc"}
+    own = resolve(Scenario(controller=report["law"], gains=f"a/{report['law']}/"))
+    np.testing.assert_allclose(
+        own.law.gain_values["k_d" if report["law"] == "ctc" else "k_1"],
+        report["candidates"][report["law"]]["gains"]["k_d" if report["law"] == "ctc" else "k_1"],
+        rtol=1e-9,
+    )
+    for front in report["fronts"].values():
+        assert [tried["ripple"] for tried in front] == sorted(t["ripple"] for t in front)
+    assert report["sentence"] in Path("a/index.html").read_text("utf-8")
+    study = yaml.safe_load(Path("a/campaign.yaml").read_text("utf-8"))
+    assert study["laws"][0] == f"{report['law']}=a/{report['law']}/"
+    again = json.loads(choose(*words, "--out", "b").stdout)
+    assert again["fronts"] == report["fronts"], "the same seed gives the same numbers"
+
+
+def test_a_law_of_ones_own_takes_part(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert CliRunner().invoke(cli, ("new", "law", "my_law")).exit_code == 0
+    own = "my_law.py:MyLaw"
+    with_gains = ("--law", f"{own}=my_law.yaml", "--law", "ctc", *SHORT, "--ripple", "1")
+    result = choose("paper", *with_gains, "--json")
+    assert result.exit_code == 0, result.exception
+    report = json.loads(result.stdout)
+    assert set(report["fronts"]) == {"my_law", "ctc"}
+    assert Path("choices/paper/my_law/my_law.yaml").is_file()
+    refused = choose("paper", "--law", own, *SHORT)
+    assert isinstance(refused.exception, InputError)
+    assert "my_law.py:MyLaw=GAINS" in str(refused.exception)
+
+
+def test_a_flight_too_short_to_judge_is_refused(tmp_path: Path) -> None:
+    result = choose("paper", "--duration", "0.5", "--out", str(tmp_path))
+    assert isinstance(result.exception, InputError)
+    assert "1 s of flight or more, got 0.5 s" in str(result.exception)
+
+
+def test_the_mean_counts_attitude_and_joints_alike() -> None:
+    metrics = {"attitude_angle.rms": 4.0, "joints_1_3.rms": 1.0, "joints_4_6.rms": 2.0}
+    assert mean_error({**metrics, "base_torque.rms": 9.0}) == pytest.approx(2.0)
