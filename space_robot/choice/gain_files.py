@@ -45,12 +45,12 @@ def write_gains(
     return folder
 
 
-def install(choice_folder: Path, laws: Sequence[str], law: str, gains: Path) -> Path:
+def install(files: Sequence[Path], set_file: Path, law: str, gains: Path) -> Path:
     """Make a law with its gains the default of a robot.
 
     Args:
-        choice_folder: with the sets of all candidates.
-        laws: whose gains go into the set, the default one first; all of one low-pass.
+        files: of the set's laws.
+        set_file: `OF_THE_SET` with the low-pass of all of them.
         law: the default law.
         gains: folder of the robot's gains.
 
@@ -62,10 +62,9 @@ def install(choice_folder: Path, laws: Sequence[str], law: str, gains: Path) -> 
     """
     folder = gains / CHOSEN
     make_folder(folder)
-    for name in laws:
-        text = (choice_folder / name / f"{name}.yaml").read_text("utf-8")
-        write_text(text, folder / f"{name}.yaml", replace=True)
-    text = (choice_folder / law / OF_THE_SET).read_text("utf-8")
+    for file in files:
+        write_text(file.read_text("utf-8"), folder / file.name, replace=True)
+    text = set_file.read_text("utf-8")
     write_text(
         f"{text}    controller: {law}  # flown unless another is named\n",
         folder / OF_THE_SET,

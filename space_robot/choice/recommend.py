@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from space_robot_control.controller.settings import OF_THE_SET
 from space_robot_control.laws import find_law, laws
 from space_robot_msgs_py.errors import InputError
 from space_robot_sim.environment.friction import coefficients
@@ -112,7 +113,8 @@ class Recommendation:
     def install(self, folder: Path, gains: Path) -> Path:
         """Make the law with its gains the default of a robot; return the set's folder.
 
-        A set has one low-pass: laws whose estimate has another are left to their own folders.
+        The set has the other laws' best gains, too, or their tuned ones. It has one low-pass: a
+        law whose estimate has another one is not in it.
 
         Args:
             folder: of the choice.
@@ -121,14 +123,20 @@ class Recommendation:
         Raises:
             InputError: a file cannot be written.
         """
-        corner = self.order[0].candidate.gains.corner_hz
-        others = [
-            each.law
-            for each in self.flown
-            if each.law != self.law
-            and (each.candidate.gains.corner_hz == corner or not has_estimate(each.law))
-        ]
-        return install(folder, [self.law, *others], self.law, gains)
+        own = {each.law: each.candidate.gains.corner_hz for each in self.flown}
+        set_folder = folder / (self.law if has_estimate(self.law) else TUNED_SET)
+        files = []
+        for tuned in sorted((folder / TUNED_SET).glob("*.yaml")):
+            law, searched = tuned.stem, folder / tuned.stem / tuned.name
+            if tuned.name == OF_THE_SET:
+                continue
+            if law == self.law or (law in own and not has_estimate(law)):
+                files.append(searched)
+            elif not has_estimate(law) or set_folder.name == TUNED_SET:
+                files.append(tuned)
+            elif own.get(law) == own[self.law]:
+                files.append(searched)
+        return install(files, set_folder / OF_THE_SET, self.law, gains)
 
 
 def recommend(

@@ -97,6 +97,7 @@ def choose(
       space-robot choose paper --case 3 --law tde_stc --law indi --evaluations 60
       space-robot choose my_robot/ --law my_law.py:MyLaw=my_law.yaml --law ctc
     """
+    from space_robot_control.laws import laws as shipped_laws
     from space_robot_model.robot.find import robot_as_path, robot_files
 
     from ..choice import ChoiceOptions, Uncertainty, recommend
@@ -128,7 +129,11 @@ def choose(
     compile_lanes()
     choice, _ = recommend(scenario, folder, wanted, command, counting_progress)
     page = write_report(choice, folder, command)
-    chosen = choice.install(folder, files.gains) if is_own and files.gains and choice.law else None
+    chosen = (
+        choice.install(folder, files.gains)
+        if is_own and files.gains and choice.law in shipped_laws()
+        else None
+    )
     if as_json:
         echo_json(report(choice))
     else:
