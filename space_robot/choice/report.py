@@ -37,31 +37,25 @@ def candidates_table(choice: Recommendation, notes: Sequence[str] = ()) -> Table
     comparisons = {c.other: c for c in choice.compared}
     rows: list[list[Any]] = []
     for law in sorted(choice.fronts, key=lambda law: (order.get(law, math.inf), law)):
-        each = flown.get(law)
-        numbers: list[Any] = [None, None, None]
-        if each:
-            numbers = [
-                each.median(criterion.value),
-                100.0 * each.candidate.score.ripple,
-                100.0 * each.median(lambda flight: flight.get("wheels.saturation", 0.0)),
-            ]
-            numbers = [number if math.isfinite(number) else None for number in numbers]
+        value = ripple = None
+        if each := flown.get(law):
+            value, ripple = each.median(criterion.value), 100.0 * each.candidate.score.ripple
+            value = value if math.isfinite(value) else None
         if law == choice.law:
             verdict = JudgedCell("", "chosen", "good")
         elif law in choice.out:
-            verdict = JudgedCell(choice.out[law], "out", "bad")
+            verdict = JudgedCell(f"{choice.out[law]}:", "out", "bad")
         elif law in comparisons:
             word = {"better": "worse", "worse": "better"}.get(comparisons[law].finding, "alike")
-            verdict = JudgedCell(f"{1.0 / comparisons[law].ratio.value:.3g} times", word, "open")
+            verdict = JudgedCell(f"{1.0 / comparisons[law].ratio.value:.3g} times,", word, "open")
         else:
-            verdict = JudgedCell("too far from the least error", "out", "bad")
-        rows.append([order.get(law), law, *numbers, verdict])
+            verdict = JudgedCell("too far from the least error:", "out", "bad")
+        rows.append([order.get(law), law, value, ripple, verdict])
     columns = [
         Column("rank", "", "d"),
         Column("law", is_label=True),
         Column("median", "", ".3g"),
         Column("ripple", "%", ".2g"),
-        Column("wheels at limit", "%", ".2g"),
         Column("beside the first", is_label=True),
     ]
     title = f"{criterion.text}, {choice.options.runs} draws"

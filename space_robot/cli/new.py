@@ -162,9 +162,16 @@ def new() -> None:
 @click.option(
     "--evaluations",
     type=click.IntRange(1, 100_000),
-    default=64,
+    default=48,
     show_default=True,
     help="Gain sets to try for each law; 1: the tuned one alone.",
+)
+@click.option(
+    "--runs",
+    type=click.IntRange(2, 100_000),
+    default=6,
+    show_default=True,
+    help="Draws that every law flies with its best gains.",
 )
 @flight_options("json")
 def new_robot(
@@ -180,6 +187,7 @@ def new_robot(
     rpy_deg: list[float] | None,
     force: bool,
     evaluations: int,
+    runs: int,
     as_json: bool,
 ) -> None:
     """Make a folder for a robot: model, mission, the law that flies it best, and its gains.
@@ -230,7 +238,7 @@ def new_robot(
     folder = out or Path(files.name)
     check_replaceable(folder, force, texts)
     compile_lanes()
-    options = replace(SHORT, evaluations=evaluations, workers=cores())
+    options = replace(SHORT, evaluations=evaluations, runs=runs, workers=cores())
     made = make_robot(texts, read, folder, command, counting_progress, options)
     click.echo(
         f"made {folder}/: `space-robot fly --robot {folder}/` flies it, "
