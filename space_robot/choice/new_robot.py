@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from space_robot_control.controller.settings import DEFAULT_SETS, OTHERS
 from space_robot_control.guidance.limits import MissionLimits
 from space_robot_control.guidance.mission import MissionSettings
 from space_robot_control.guidance.segments import read_segments
@@ -27,7 +28,7 @@ from space_robot_sim.environment.environment import EnvironmentSettings
 from ..console.files import atomic_folder
 from ..tuning.gain_file import estimate_remark
 from ..tuning.task import force_demand
-from .recommend import ChoiceOptions, Recommendation, ShowSteps, recommend
+from .recommend import TUNED_SET, ChoiceOptions, Recommendation, ShowSteps, recommend
 from .report import campaign_text
 from .robot_files import CAMPAIGN_FILE, ROBOT_FILE
 
@@ -187,9 +188,12 @@ def make_robot(
         choice, tuned = recommend({"robot": str(place), **TRIAL}, gains, options, command, progress)
         if choice.law:
             choice.install(gains, gains)
-        own = replace(choice, scenario={**choice.scenario, "robot": f"{folder}/"})
-        text = campaign_text(own, folder / OWN_GAINS, command)
-        (place / CAMPAIGN_FILE).write_text(text, "utf-8")
+            own = replace(choice, scenario={**choice.scenario, "robot": f"{folder}/"})
+            text = campaign_text(own, folder / OWN_GAINS, command)
+            (place / CAMPAIGN_FILE).write_text(text, "utf-8")
+        else:
+            text = f"# The set of each law.\n{OTHERS}: {TUNED_SET}\n"
+            (gains / DEFAULT_SETS).write_text(text, "utf-8")
     advice = (
         f"With {CONDITIONS}: {choice.sentence}",
         estimate_remark(tuned),

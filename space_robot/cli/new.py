@@ -240,9 +240,9 @@ def new_robot(
     compile_lanes()
     options = replace(SHORT, evaluations=evaluations, runs=runs, workers=cores())
     made = make_robot(texts, read, folder, command, counting_progress, options)
+    then = f", `space-robot campaign run {folder}/{CAMPAIGN_FILE}` the best laws with more draws"
     click.echo(
-        f"made {folder}/: `space-robot fly --robot {folder}/` flies it, "
-        f"`space-robot campaign run {folder}/{CAMPAIGN_FILE}` with dispersed masses",
+        f"made {folder}/: `space-robot fly --robot {folder}/` flies it{then * bool(made.choice.law)}",
         err=True,
     )
     if as_json:
