@@ -240,11 +240,10 @@ def new_robot(
     compile_lanes()
     options = replace(SHORT, evaluations=evaluations, runs=runs, workers=cores())
     made = make_robot(texts, read, folder, command, counting_progress, options)
-    then = f", `space-robot campaign run {folder}/{CAMPAIGN_FILE}` the best laws with more draws"
-    click.echo(
-        f"made {folder}/: `space-robot fly --robot {folder}/` flies it{then * bool(made.choice.law)}",
-        err=True,
-    )
+    said = f"made {folder}/: `space-robot fly --robot {folder}/` flies it"
+    if made.choice.law:
+        said += f", `space-robot campaign run {folder}/{CAMPAIGN_FILE}` the best laws in more draws"
+    click.echo(said, err=True)
     if as_json:
         echo_json(made.report())
     else:
