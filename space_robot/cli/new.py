@@ -160,6 +160,13 @@ def new() -> None:
 )
 @click.option("--force", is_flag=True, help="Replace an older folder of this command.")
 @click.option(
+    "--law",
+    "laws",
+    multiple=True,
+    metavar="LAW",
+    help="A law that takes part; may be repeated [default: all].",
+)
+@click.option(
     "--evaluations",
     type=click.IntRange(1, 100_000),
     default=48,
@@ -186,6 +193,7 @@ def new_robot(
     at: list[float] | None,
     rpy_deg: list[float] | None,
     force: bool,
+    laws: tuple[str, ...],
     evaluations: int,
     runs: int,
     as_json: bool,
@@ -239,6 +247,7 @@ def new_robot(
     check_replaceable(folder, force, texts)
     compile_lanes()
     options = replace(SHORT, evaluations=evaluations, runs=runs, workers=cores())
+    options = replace(options, laws=laws or SHORT.laws)
     made = make_robot(texts, read, folder, command, counting_progress, options)
     said = f"made {folder}/: `space-robot fly --robot {folder}/` flies it"
     if made.choice.law:
