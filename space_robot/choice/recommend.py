@@ -161,7 +161,7 @@ def recommend(
     Raises:
         InputError: the scenario cannot be flown, or it has no such law.
     """
-    names = options.laws or tuple(sorted(laws()))
+    names = tuple(dict.fromkeys(options.laws)) or tuple(sorted(laws()))
     of_tuning = {key: scenario[key] for key in TUNED if key in scenario}
     tuned = tuned_set(
         of_tuning, [str(scenario.get("case", "1"))], INITIAL_TUNING, lambda text: None

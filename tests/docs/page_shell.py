@@ -290,12 +290,13 @@ class PageShell:
         if command[:2] != ("new", "my.urdf") or "--help" in command:
             return None
         options = " ".join(command)
+        folder = command[command.index("--out") + 1]
         if (kept := self._new.get(options)) is None:
             ended = space_robot_here(*command)
             self._new[options] = self.root / f"new{len(self._new)}"
-            shutil.copytree(command[-1], self._new[options])
+            shutil.copytree(folder, self._new[options])
             return ended
-        shutil.copytree(kept, command[-1])
+        shutil.copytree(kept, folder)
         return subprocess.CompletedProcess(command, 0, "", "")
 
 

@@ -165,7 +165,7 @@ def manual() -> dict[str, Any]:
     names: dict[str, Any] = {}
     text = (DOCS / "manual/python.md").read_text("utf-8")
     blocks = [code for gym, code in PYTHON.findall(text) if not gym]
-    assert len(blocks) == 7
+    assert len(blocks) == 8
     for code in blocks:
         exec(compile(code, "python.md", "exec"), names)
     return names
