@@ -141,6 +141,24 @@ def wheel_saturation(flight: AnalysedLog) -> dict[str, float]:
     return numbers
 
 
+@metrics(
+    "saturation",
+    {"{wheel}.reversals": Definition("1/s", "how often the wheel's sense of rotation changes")},
+    applies=lambda flight: flight.log.wheel_velocities.shape[1] > 0,
+)
+def wheel_reversals(flight: AnalysedLog) -> dict[str, float]:
+    """Count the passages of each wheel through standstill, where friction is worst."""
+    log = flight.log
+
+    def count(start: int, stop: int) -> NDArray[np.intp]:
+        sense = np.sign(log.wheel_velocities[max(start - 1, 0) : stop])
+        changes: NDArray[np.intp] = np.count_nonzero(sense[1:] * sense[:-1] < 0.0, axis=0)
+        return changes
+
+    rates = flight.sum_up(count) / (log.ticks * log.timebase.period)
+    return {f"{n}.reversals": float(r) for n, r in zip(flight.parts("wheel"), rates, strict=True)}
+
+
 def wheel_motion(
     log: FlightLog, start: int, stop: int, wheels: WheelSettings
 ) -> tuple[Array, Array]:
@@ -227,6 +245,28 @@ def beyond_limits(flight: AnalysedLog) -> dict[str, float]:
         for k, name in enumerate(joints)
         if np.isfinite(limits[:, k]).any()
         for row, kind in enumerate(LIMIT_KINDS)
+    }
+
+
+@metrics(
+    "joints",
+    {
+        "{joint}.effort_used": Definition(
+            "share", "largest effort, of the limit in the robot's file"
+        )
+    },
+)
+def effort_used(flight: AnalysedLog) -> dict[str, float]:
+    """Return the share of its effort limit that each joint needed; of joints with a limit."""
+    log = flight.log
+    largest = np.zeros(len(log.joint_names))
+    for start, stop in flight.blocks():
+        np.maximum(largest, np.abs(log.applied_torque[start:stop, 3:]).max(axis=0), out=largest)
+    efforts = [limits.effort for limits in flight.robot.limits[: len(largest)]]
+    return {
+        f"{name}.effort_used": float(most / effort)
+        for name, most, effort in zip(log.joint_names, largest, efforts, strict=True)
+        if 0.0 < effort < np.inf
     }
 
 

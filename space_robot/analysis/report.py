@@ -18,7 +18,7 @@ from .errors import UNAVAILABLE
 from .measure import evaluate
 from .report_tables import comparison_table, sizing_table
 from .sizing import ActuatorSet, load_requirements
-from .words import Report, law_of, notes, remarks
+from .words import Report, law_of, notes, remarks, warnings
 
 if TYPE_CHECKING:
     import jinja2
@@ -57,6 +57,7 @@ def analyze(
         "pointing": pointing,
         "metrics": numbers,
         "sizing": None if "sizing" in unavailable else _sizing(flight, actuators, numbers),
+        "warnings": warnings(numbers),
         "unavailable": unavailable,
         **recording(flight.log),
     }

@@ -21,6 +21,10 @@ FASTEST_CYCLE = 100.0
 """Hz; faster is chatter, which has a column of its own."""
 PURE_CYCLE, LARGE_CYCLE = 0.5, 0.1
 """Least RMS of a limit cycle as a share of the torque's ripple, and of the whole torque."""
+OFTEN_REVERSED = 1.0
+"""Changes of a wheel's sense of rotation, 1/s, that are worth a warning."""
+NEAR = 0.9
+"""Share of a limit of effort from which on it is near."""
 LASTING_CYCLE = 0.5
 """Least share of a flight's segments that have the ripple of a limit cycle; a burst has less."""
 
@@ -68,12 +72,21 @@ def remarks(report: Report) -> list[str]:
         *_missed_captures(metrics),
         *_drift(metrics),
         *_pointing(report["pointing"], metrics),
+        *report["warnings"],
+        *filter(None, (report["unfinished"], *report["damage"])),
+        *_missing_ticks(report),
+    ]
+
+
+def warnings(metrics: Metrics) -> list[str]:
+    """Say what should not be in a flight, a sentence each: limits met, limit cycles."""
+    return [
         *_saturated_wheels(metrics),
+        *_reversing_wheels(metrics),
         *limit_cycles(metrics),
         *_standing_joints(metrics),
         *_beyond_limits(metrics),
-        *filter(None, (report["unfinished"], *report["damage"])),
-        *_missing_ticks(report),
+        *_near_limits(metrics),
     ]
 
 
@@ -126,6 +139,12 @@ def _saturated_wheels(metrics: Metrics) -> Iterator[str]:
         )
 
 
+def _reversing_wheels(metrics: Metrics) -> Iterator[str]:
+    rates = of_statistic(metrics, "reversals")
+    if often := [f"{name} {rate:.2g}" for name, rate in rates.items() if rate >= OFTEN_REVERSED]:
+        yield f"wheels that change their sense of rotation, times a second: {', '.join(often)}"
+
+
 def limit_cycles(metrics: Metrics) -> Iterator[str]:
     """Say which torques oscillate at one frequency, by more than a share of what they do."""
     cycles = [
@@ -156,6 +175,12 @@ def _beyond_limits(metrics: Metrics) -> Iterator[str]:
             joints.append(f"{name} ({', '.join(texts)})")
     if joints:
         yield f"joints beyond the limits of the robot's file: {', '.join(joints)}"
+
+
+def _near_limits(metrics: Metrics) -> Iterator[str]:
+    shares = of_statistic(metrics, "effort_used")
+    if near := [f"{name} {share:.0%}" for name, share in shares.items() if NEAR <= share <= 1.0]:
+        yield f"joints near their limit of effort: {', '.join(near)}"
 
 
 def _missing_ticks(report: Report) -> Iterator[str]:

@@ -19,7 +19,7 @@ from space_robot.analysis import analyze, measure
 from space_robot.analysis.actuation import standing
 from space_robot.analysis.analysed_log import AnalysedLog
 from space_robot.analysis.report_tables import sizing_table
-from space_robot.analysis.words import of_statistic, remarks
+from space_robot.analysis.words import of_statistic, remarks, warnings
 from space_robot_model.hardware.base_actuators import BaseActuatorSettings
 from space_robot_model.robot import Robot
 from space_robot_model.robot.find import find_robot, robot_names
@@ -128,6 +128,20 @@ def test_joints_stand_where_they_were_to_move() -> None:
     assert found == {"a.standing": 0.0, "b.standing": pytest.approx(0.0625, abs=1e-3)}
 
 
+def test_wheels_that_reverse_and_efforts_near_a_limit_are_warnings() -> None:
+    log = flown(actuators="wheels", sensors="fine", duration=1.0)
+    report, speeds = analyze(log), log.wheel_velocities
+    metrics = report["metrics"]
+    changes = [len(np.flatnonzero(np.diff(wheel[wheel != 0.0] > 0.0))) for wheel in speeds.T]
+    assert [metrics[f"wheel_{k}.reversals"] for k in range(1, 5)] == changes
+    assert report["warnings"] == warnings(metrics)
+    said = warnings({"wheel_1.reversals": 1.0, "wheel_2.reversals": 0.9, "a.effort_used": 0.95})
+    assert said == [
+        "wheels that change their sense of rotation, times a second: wheel_1 1",
+        "joints near their limit of effort: a 95%",
+    ]
+
+
 def test_joints_that_stood_are_said_from_a_share_of_their_way_on() -> None:
     """Friction of 2 N m and a law that is weak on three joints."""
     weak = {f"pd.{name}": [1e4] * 6 + [5.0] * 3 for name in ("k_p", "k_d")}
@@ -138,10 +152,10 @@ def test_joints_that_stood_are_said_from_a_share_of_their_way_on() -> None:
     for joint in range(1, 7):
         del metrics[f"joint{joint}.standing"]
     metrics |= {"a.standing": 0.051, "b.standing": 0.05, "c.standing": 0.049}
-    (said,) = [x for x in remarks(report) if "stood still" in x]
+    (said,) = [x for x in warnings(metrics) if "stood still" in x]
     assert said.endswith("way they were to move: a 5%, b 5%")
     metrics |= {"a.standing": 0.0, "b.standing": 0.0}
-    assert not [x for x in remarks(report) if "stood still" in x]
+    assert not [x for x in warnings(metrics) if "stood still" in x]
 
 
 def test_saturation_and_missed_deadlines_are_the_plants() -> None:
@@ -169,7 +183,8 @@ def test_wheels_at_their_limits_are_counted_and_said(paper_robot: Robot) -> None
     log.wheel_torques[50, 2], log.wheel_velocities[49, 2] = 0.25, (2.0 - 0.25 * 0.0005) / 0.1
     log.flight["parameters"] = {"plant": {"base_torque_limit": 0.5, "joint_torque_limit": 3.0}}
     report = analyze(log)
-    found = {name: x for name, x in report["metrics"].items() if name.startswith("wheel")}
+    counted = report["metrics"].items()
+    found = {name: x for name, x in counted if name.startswith("wheel") and "reve" not in name}
     assert found == {
         "wheels.saturation": 0.32,
         "wheels.saturation_ticks": 10 + 21 + 1,
