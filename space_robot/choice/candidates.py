@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache, partial
 from typing import NamedTuple
@@ -11,15 +11,14 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..analysis.words import Metrics, limit_cycles
+from ..analysis.words import Metrics, limit_cycles, of_statistic
 from ..campaign.draws import Draws
 from ..campaign.study import Study
 from ..campaign.verdicts.laws import PairedComparison, compare
-from ..flight.batch import FlightBatch, batches
 from ..processes.executor import run_all
 from .criteria import CRITERIA, Criterion, is_error
 from .search_space import GainPoint
-from .trials import Score, alone
+from .trials import Score, fly_in_lanes
 
 Array = NDArray[np.float64]
 
@@ -95,12 +94,12 @@ class FlownCandidate:
         cycles = [text for flight in flown for text in limit_cycles(flight)]
         if len(cycles) > OFTEN * count:
             return f"{cycles[0]} (in {len(cycles)} of {count} flights)"
-        if any(any(_of(flight, ".beyond_effort").values()) for flight in flown):
+        if any(any(of_statistic(flight, "beyond_effort").values()) for flight in flown):
             return "joints beyond their limits of effort"
         share = float(np.median([flight.get("wheels.saturation", 0.0) for flight in flown]))
         if share > MOST_SATURATION:
             return f"wheels at their limit in {share:.0%} of the ticks"
-        for name in _of(flown[0], ".standing"):
+        for name in of_statistic(flown[0], "standing"):
             held = float(np.median([flight.get(f"{name}.standing", 0.0) for flight in flown]))
             if held > HELD:
                 return f"{name} held by friction on {held:.0%} of its way"
@@ -163,23 +162,11 @@ def _fly(
 ) -> list[dict[str, float]]:
     draws = _draws(text, seed, runs)
     flights = [draws.flight(run, task.law) for run in task.runs]
-    metrics: list[dict[str, float]] = [{} for _ in flights]
-    for group in batches(enumerate(flights)):
-        if len(group) == 1:
-            number, flight = group[0]
-            log, share = alone(flight)
-            metrics[number] = CRITERIA[criterion].of(log) if share >= 1.0 else {}
-            continue
-        for flown in FlightBatch([flight for _, flight in group]).fly():
-            if flown.ending.error is None:
-                metrics[group[flown.flight][0]] = CRITERIA[criterion].of(flown.log)
-    return metrics
+    return [
+        CRITERIA[criterion].of(log) if share >= 1.0 else {} for log, share in fly_in_lanes(flights)
+    ]
 
 
 @lru_cache(maxsize=2)
 def _draws(text: str, seed: int, runs: int) -> Draws:
     return Draws(Study.model_validate_json(text), seed, runs)
-
-
-def _of(metrics: Mapping[str, float], end: str) -> dict[str, float]:
-    return {k.removesuffix(end): value for k, value in metrics.items() if k.endswith(end)}

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from fnmatch import fnmatchcase
+from operator import itemgetter
 from typing import NamedTuple
 
 from space_robot_msgs_py.bag.flight_log import FlightLog
@@ -45,18 +46,7 @@ def is_error(name: str) -> bool:
     return name.endswith(".rms") and name.startswith(("attitude_angle.", "joints_"))
 
 
-def _attitude(metrics: Metrics) -> float:
-    return metrics["attitude_angle.rms"]
-
-
-def _tool(metrics: Metrics) -> float:
-    return metrics["tool_position.rms"]
-
-
-def _wheel_motion(metrics: Metrics) -> float:
-    return metrics["base_torque.variation"]
-
-
+_attitude, _tool = itemgetter("attitude_angle.rms"), itemgetter("tool_position.rms")
 CRITERIA = {
     "tracking": Criterion(
         "geometric mean of the RMS errors of attitude and joints", mean_error, mean_error
@@ -66,7 +56,7 @@ CRITERIA = {
     "wheels": Criterion(
         "motion of the base's torque up and down, which wears wheels, among laws with at most "
         "three times the least tracking error",
-        _wheel_motion,
+        itemgetter("base_torque.variation"),
         mean_error,
         ("base_torque.variation",),
         near=3.0,

@@ -80,8 +80,8 @@ class Front:
         allowed = [tried for tried in self.best if tried.score.ripple <= ripple]
         return allowed[-1] if allowed else None
 
-    def why_none(self, ripple: float) -> str:
-        """Say why no gain set has so little ripple."""
+    def why_none(self) -> str:
+        """Say why no gain set has as little ripple as allowed."""
         count, scores = len(self.tried), [tried.score for tried in self.tried]
         ended = sum(score.flown < 1.0 for score in scores)
         beyond = sum(score.beyond for score in scores)
@@ -132,7 +132,6 @@ def search_front(
     evaluations: int,
     seed: int,
     weights: Sequence[float] = RIPPLE_WEIGHTS,
-    step: Callable[[int], None] = lambda tried: None,
 ) -> Front:
     """Search the front of a law.
 
@@ -143,7 +142,6 @@ def search_front(
         evaluations: gain sets to try, in all.
         seed: of the search.
         weights: of the ripple, see the module.
-        step: called with the number of gain sets tried.
     """
     import cma  # slow to import
     from scipy.stats import qmc
@@ -153,7 +151,6 @@ def search_front(
     def fly(points: Sequence[Array]) -> list[Score]:
         scores = trials.fly([space.at(point) for point in points])
         front.tried.extend(map(Tried, points, scores))
-        step(len(front.tried))
         return scores
 
     spread = qmc.Sobol(space.dimension, seed=np.random.default_rng(seed)).random(FIRST_DESIGN)

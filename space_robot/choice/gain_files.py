@@ -70,5 +70,14 @@ def install(files: Sequence[Path], set_file: Path, law: str, gains: Path) -> Pat
         folder / OF_THE_SET,
         replace=True,
     )
-    write_text(f"# The set of each law.\n{OTHERS}: {CHOSEN}\n", gains / DEFAULT_SETS, replace=True)
+    make_default(CHOSEN, gains)
     return folder
+
+
+def make_default(name: str, gains: Path) -> None:
+    """Make a set the default of all laws.
+
+    Raises:
+        InputError: the file cannot be written.
+    """
+    write_text(f"# The set of each law.\n{OTHERS}: {name}\n", gains / DEFAULT_SETS, replace=True)

@@ -12,7 +12,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from space_robot_control.controller.settings import DEFAULT_SETS, OTHERS
 from space_robot_control.guidance.limits import MissionLimits
 from space_robot_control.guidance.mission import MissionSettings
 from space_robot_control.guidance.segments import read_segments
@@ -28,6 +27,7 @@ from space_robot_sim.environment.environment import EnvironmentSettings
 from ..console.files import atomic_folder
 from ..tuning.gain_file import estimate_remark
 from ..tuning.task import force_demand
+from .gain_files import make_default
 from .recommend import TUNED_SET, ChoiceOptions, Recommendation, ShowSteps, recommend
 from .report import campaign_text
 from .robot_files import CAMPAIGN_FILE, ROBOT_FILE
@@ -192,8 +192,7 @@ def make_robot(
             text = campaign_text(own, folder / OWN_GAINS, command)
             (place / CAMPAIGN_FILE).write_text(text, "utf-8")
         else:
-            text = f"# The set of each law.\n{OTHERS}: {TUNED_SET}\n"
-            (gains / DEFAULT_SETS).write_text(text, "utf-8")
+            make_default(TUNED_SET, gains)
     advice = (
         f"With {CONDITIONS}: {choice.sentence}",
         estimate_remark(tuned),

@@ -41,6 +41,13 @@ ShowSteps = Callable[[str], AbstractContextManager[Callable[[int], Callable[[], 
 INITIAL_TUNING = TuningOptions(margin=0.05, mass_uncertainty=0.2, h_bar=AUTO)
 """Requirements on the gains from which the search starts."""
 
+WITHOUT_PAYLOAD = "1"
+"""The case with friction alone."""
+TUNED_SET = "tuned"
+"""Name of the set from which the search starts."""
+TUNED = ("robot", "mission", "sensors", "navigation", "orbit", "period", "parameters")
+"""Options of a scenario that gains are tuned for."""
+
 
 @dataclass(frozen=True)
 class ChoiceOptions:
@@ -163,22 +170,26 @@ def recommend(
     """
     names = tuple(dict.fromkeys(options.laws)) or tuple(sorted(laws()))
     of_tuning = {key: scenario[key] for key in TUNED if key in scenario}
-    tuned = tuned_set(
-        of_tuning, [str(scenario.get("case", "1"))], INITIAL_TUNING, lambda text: None
-    )
+    tuned = _tuned(of_tuning, str(scenario.get("case", WITHOUT_PAYLOAD)))
     write_set(tuned, command, folder / TUNED_SET)
     points, gains = tuned_points(tuned), f"{folder}/{TUNED_SET}"
     for law in names:
         kind = find_law(Law.parse(law).controller)
         if "=" not in law and kind.name not in points:
             raise InputError(f"law {law}: has no tuned gains: give some, {law}=GAINS")
-    search = _Search(dict(scenario), gains, points, {}, np.empty((0, 2)), options)
+    search = _Search(dict(scenario), gains, points, options)
     nominal = Scenario(**search.options_of(names[0])).check()
     known = nominal.scenario.robots.controller
     friction = coefficients(known, nominal.plant_settings.friction)[: known.n]
     if (duration := nominal.ticks * nominal.period) < SHORTEST_S:
         raise InputError(f"a choice needs {SHORTEST_S:g} s of flight or more, got {duration:g} s")
-    search = replace(search, torques=torques_of(nominal), friction=friction)
+    search = replace(
+        search,
+        torques=torques_of(nominal),
+        friction=friction,
+        duration=min(duration, options.longest_s),
+        controls_base=nominal.controls_base,
+    )
     with progress("fronts of the laws") as begin:
         searched = run_all(search, names, min(options.workers, len(names)), begin)
     fronts = {front.law: front for front in searched}
@@ -188,7 +199,7 @@ def recommend(
         controller = Law.parse(law).controller
         tried = front.within(options.ripple)
         if tried is None:
-            out[front.law] = front.why_none(options.ripple)
+            out[front.law] = front.why_none()
             continue
         point = search.space(law).at(tried.point)
         where = write_gains(controller, point, folder, command, tried.score)
@@ -206,14 +217,6 @@ def recommend(
         dict(scenario), options, fronts, flown, order, compared, out, study.vary
     )
     return found_law, tuned
-
-
-WITHOUT_PAYLOAD = "1"
-"""The case with friction alone."""
-TUNED_SET = "tuned"
-"""Name of the set from which the search starts."""
-TUNED = ("robot", "mission", "sensors", "navigation", "orbit", "period", "parameters")
-"""Options of a scenario that gains are tuned for."""
 
 
 def _tuned(options: Mapping[str, Any], case: str) -> Tuned:
@@ -260,17 +263,19 @@ class _Search:
     scenario: dict[str, Any]
     gains: str
     points: dict[str, GainPoint]
-    torques: dict[str, float]
-    friction: Array
-    """f_C and f_V (n, 2) of the joints as a user knows them."""
     options: ChoiceOptions
+    torques: dict[str, float] = field(default_factory=dict)
+    friction: Array = field(default_factory=lambda: np.empty((0, 2)))
+    """f_C and f_V (n, 2) of the joints as a user knows them."""
+    duration: float = 0.0
+    """Of a trial, s."""
+    controls_base: bool = True
 
     def __call__(self, law: str) -> Front:
         """Return the front of a law."""
-        options, flight = self.options, Scenario(**self.options_of(law)).check()
-        duration = min(flight.ticks * flight.period, options.longest_s)
+        options = self.options
         trials = Trials(
-            Scenario(**{**self.options_of(law), "duration": duration}),
+            Scenario(**{**self.options_of(law), "duration": self.duration}),
             options.uncertainty,
             self.torques,
             CRITERIA[options.criterion],
@@ -288,7 +293,7 @@ class _Search:
 
     def space(self, law: str) -> SearchSpace:
         """Return the search space of a law."""
-        controller, has_base = Law.parse(law).controller, self.scenario.get("actuators") != "none"
+        controller = Law.parse(law).controller
         start = self.points.get(controller)
         if "=" in law:
             scenario = resolve(Scenario(**self.options_of(law)))
@@ -296,5 +301,5 @@ class _Search:
             start = GainPoint(scenario.law.gain_values, corner)
         assert start is not None
         return SearchSpace(
-            find_law(controller), start, self.friction, has_base, has_estimate(controller)
+            find_law(controller), start, self.friction, self.controls_base, has_estimate(controller)
         )

@@ -51,7 +51,7 @@ DEAD_BAND_RATE = 1e-4
 FILTER = "low-pass of the estimate"
 """The one factor on a number of the set instead of a law's: its corner frequency."""
 SLOWEST_HZ, FASTEST_HZ = 2.0, 900.0
-"""Deviation frequencies of that low-pass between which is searched."""
+"""Corner frequencies of that low-pass between which is searched."""
 AGAINST_FRICTION = (INTEGRAL, FRICTION, DEAD_BAND)
 KNOWN: Mapping[str, Sequence[Factor]] = {
     "pd": [bandwidth(k_p=2, k_d=1), DAMPING, *AGAINST_FRICTION],

@@ -132,37 +132,28 @@ class Trials:
         self.nominal = Nominal(scenario)
         self.law = self.nominal.resolved.law
         self._torques, self._criterion = torques, criterion
-        self._variations = [self._variation(corner) for corner in uncertainty.deviations]
+        self._variations = [self._variation(deviation) for deviation in uncertainty.deviations]
 
     def fly(self, points: Sequence[GainPoint]) -> list[Score]:
         """Fly the trials of several gain sets in lanes, and score each."""
         flights = [
             self._flight(variation, point) for point in points for variation in self._variations
         ]
-        logs: list[tuple[FlightLog, float]] = [None] * len(flights)  # type: ignore[list-item]
-        for group in batches(enumerate(flights)):
-            if len(group) == 1:
-                number, flight = group[0]
-                logs[number] = alone(flight)
-                continue
-            for flown in FlightBatch([flight for _, flight in group]).fly():
-                number, flight = group[flown.flight]
-                share = 1.0 if flown.ending.error is None else flown.log.ticks / flight.ticks
-                logs[number] = flown.log, share
-        count = len(self._variations)
-        return [
-            self._score([self._measured(*log) for log in logs[k : k + count]])
-            for k in range(0, len(logs), count)
+        trials = [
+            {"flown": share, **(self._criterion.of(log) if share >= 1.0 else {})}
+            for log, share in fly_in_lanes(flights)
         ]
+        count = len(self._variations)
+        return [self._score(trials[k : k + count]) for k in range(0, len(trials), count)]
 
-    def _variation(self, corner: Deviation) -> Variation:
+    def _variation(self, deviation: Deviation) -> Variation:
         tree, changed = self.nominal.tree, dict[Path, Any]()
         robot = tree["robot"]
         bodies = [("base",), *(("links", name) for name in robot["links"])]
         for body in bodies:
             for number in ("mass", "inertia"):
                 path = ("robot", *body, number)
-                changed[path] = corner.mass * value_at(tree, path)
+                changed[path] = deviation.mass * value_at(tree, path)
         for kind in ("coulomb", "viscous"):
             paths = [
                 ("plant", "friction", kind),
@@ -171,10 +162,10 @@ class Trials:
             for path in paths:
                 value = value_at(tree, path)
                 if not isinstance(value, Unavailable):
-                    changed[path] = corner.friction * value
+                    changed[path] = deviation.friction * value
         latency = ("plant", "command_latency_ticks")
-        changed[latency] = value_at(tree, latency) + corner.latency_ticks
-        changed["faults", "torque_scale@0:all={}"] = corner.torque_scale
+        changed[latency] = value_at(tree, latency) + deviation.latency_ticks
+        changed["faults", "torque_scale@0:all={}"] = deviation.torque_scale
         return self.nominal.variation(changed, self.nominal.scenario.seed)
 
     def _flight(self, variation: Variation, point: GainPoint) -> Flight:
@@ -186,9 +177,6 @@ class Trials:
             return flight
         controller = settings.model_copy(update={"acceleration_filter_hz": point.corner_hz})
         return Flight(replace(flight.scenario, controller=controller))
-
-    def _measured(self, log: FlightLog, flown: float) -> dict[str, float]:
-        return {"flown": flown, **(self._criterion.of(log) if flown >= 1.0 else {})}
 
     def _score(self, trials: Sequence[Metrics]) -> Score:
         flown = float(np.mean([trial["flown"] for trial in trials]))
@@ -208,8 +196,22 @@ class Trials:
         )
 
 
-def alone(flight: Flight) -> tuple[FlightLog, float]:
-    """Fly a flight by itself; return its log and the share of it that was flown."""
+def fly_in_lanes(flights: Sequence[Flight]) -> list[tuple[FlightLog, float]]:
+    """Fly flights, those in lanes that can share them; return log and share flown of each."""
+    logs: dict[int, tuple[FlightLog, float]] = {}
+    for group in batches(enumerate(flights)):
+        if len(group) == 1:
+            number, flight = group[0]
+            logs[number] = _fly_alone(flight)
+            continue
+        for flown in FlightBatch([flight for _, flight in group]).fly():
+            number, flight = group[flown.flight]
+            share = 1.0 if flown.ending.error is None else flown.log.ticks / flight.ticks
+            logs[number] = flown.log, share
+    return [logs[number] for number in range(len(flights))]
+
+
+def _fly_alone(flight: Flight) -> tuple[FlightLog, float]:
     try:
         return simulate(flight), 1.0
     except FlightError as error:

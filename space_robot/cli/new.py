@@ -246,8 +246,9 @@ def new_robot(
     folder = out or Path(files.name)
     check_replaceable(folder, force, texts)
     compile_lanes()
-    options = replace(SHORT, evaluations=evaluations, runs=runs, workers=cores())
-    options = replace(options, laws=laws or SHORT.laws)
+    options = replace(
+        SHORT, laws=laws or SHORT.laws, evaluations=evaluations, runs=runs, workers=cores()
+    )
     made = make_robot(texts, read, folder, command, counting_progress, options)
     said = f"made {folder}/: `space-robot fly --robot {folder}/` flies it"
     if made.choice.law:
