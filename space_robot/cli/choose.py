@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shlex
+from functools import reduce
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +11,36 @@ import click
 
 from .gains import WORDS, TypedCommand
 from .option_types import FiniteRange, names_in
-from .options import flight_options, folder_option
+from .options import Decorator, flight_options, folder_option
+
+
+def search_options(evaluations: int, runs: int) -> Decorator:
+    """Return the options of a search for the best law, with their defaults."""
+    options = (
+        click.option(
+            "--law",
+            "laws",
+            multiple=True,
+            metavar="LAW",
+            help="A law that takes part, also file.py:Class=GAINS of your own; may be repeated "
+            "[default: all].",
+        ),
+        click.option(
+            "--evaluations",
+            type=click.IntRange(1, 100_000),
+            default=evaluations,
+            show_default=True,
+            help="Gain sets to try for each law; 1: the tuned one alone.",
+        ),
+        click.option(
+            "--runs",
+            type=click.IntRange(2, 100_000),
+            default=runs,
+            show_default=True,
+            help="Draws that every law flies with its best gains.",
+        ),
+    )
+    return lambda command: reduce(lambda inner, option: option(inner), reversed(options), command)
 
 
 @click.command(cls=TypedCommand)
@@ -36,28 +66,7 @@ from .options import flight_options, folder_option
     help="Largest ripple of a torque, RMS above 2 Hz, as a share of the largest that the mission "
     "asks.",
 )
-@click.option(
-    "--law",
-    "laws",
-    multiple=True,
-    metavar="LAW",
-    help="A law that takes part, also file.py:Class=GAINS of your own; may be repeated [default: "
-    "all].",
-)
-@click.option(
-    "--evaluations",
-    type=click.IntRange(1, 100_000),
-    default=160,
-    show_default=True,
-    help="Gain sets to try for each law.",
-)
-@click.option(
-    "--runs",
-    type=click.IntRange(2, 100_000),
-    default=24,
-    show_default=True,
-    help="Draws that every law flies with its best gains.",
-)
+@search_options(evaluations=160, runs=24)
 @click.option("--seed", type=click.IntRange(0), default=1, show_default=True, help="Of all draws.")
 @click.option(
     "--mass-uncertainty",

@@ -13,6 +13,7 @@ import click
 from click.shell_completion import CompletionItem
 
 from . import new_files
+from .choose import search_options
 from .option_types import NumberList, names_in
 from .options import BASE, REPAIR, flight_options
 
@@ -159,27 +160,7 @@ def new() -> None:
     help="Roll, pitch, yaw of the arm's root on the satellite, degrees [default: 0,0,0].",
 )
 @click.option("--force", is_flag=True, help="Replace an older folder of this command.")
-@click.option(
-    "--law",
-    "laws",
-    multiple=True,
-    metavar="LAW",
-    help="A law that takes part; may be repeated [default: all].",
-)
-@click.option(
-    "--evaluations",
-    type=click.IntRange(1, 100_000),
-    default=48,
-    show_default=True,
-    help="Gain sets to try for each law; 1: the tuned one alone.",
-)
-@click.option(
-    "--runs",
-    type=click.IntRange(2, 100_000),
-    default=6,
-    show_default=True,
-    help="Draws that every law flies with its best gains.",
-)
+@search_options(evaluations=48, runs=6)
 @flight_options("json")
 def new_robot(
     robot: str,
