@@ -126,7 +126,8 @@ def view(
     from space_robot_msgs_py.errors import InputError
 
     from ..analysis.plotted import parse_kinds
-    from ..console.files import atomic_file, check_writable, make_folder
+    from ..api.flight_page import FlightPage, show_page
+    from ..console.files import check_writable, make_folder
     from ..console.progress import counting_progress
     from ..view.flights import ViewOptions, flights_page, remarks_on, shown_robot
     from ..view.stage import check_viser
@@ -150,12 +151,8 @@ def view(
         click.echo(line, err=True)
     options = ViewOptions(side_by_side, rate, title, not light, kinds)
     with counting_progress("drawing") as advance:
-        data = flights_page(logs, robots, options, advance).encode()
-    with atomic_file(page, replace=True) as written:
-        written.write(data)
-    click.echo(f"wrote {page} ({page.stat().st_size / 1e6:.1f} MB)", err=True)
-    if opens and not webbrowser.open(page.absolute().as_uri()):
-        click.echo("no browser available: open the page in one yourself", err=True)
+        html = flights_page(logs, robots, options, advance)
+    show_page(FlightPage(html), page, opens)
 
 
 def _check_options(context: click.Context, live: bool, bags: tuple[Path, ...]) -> None:

@@ -248,13 +248,20 @@ def opened(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> list[str]:
 
 
 def test_the_page_is_written_and_opened(
-    named: FlownFlight, opened: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    named: FlownFlight,
+    opened: list[str],
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     page = named.view()
     assert (tmp_path / "tde_stc_view.html").read_text("utf-8") == page.html
     assert opened == [(tmp_path / "tde_stc_view.html").as_uri()]
     assert "wrote tde_stc_view.html (" in capsys.readouterr().err
     assert "MB" in repr(page)
+    monkeypatch.setattr(webbrowser, "open", lambda url: False)
+    named.view()
+    assert capsys.readouterr().err.endswith("no browser available: open the page in one yourself\n")
 
 
 def test_others_are_drawn_over_it(named: FlownFlight, opened: list[str], tmp_path: Path) -> None:

@@ -192,13 +192,13 @@ def _folder_for_file(folder: Path) -> Path:
 
 
 def _write(path: Path, entries: list[tuple[str, str, str, bytes]]) -> Path:
-    """An MCAP file: topic, type, encoding, message."""
+    """An MCAP file: topic (empty: not in the file), type, encoding, message."""
     with path.open("wb") as file:
         writer = McapWriter(file)
         writer.start("ros2")
         for stamp, (topic, kind, encoding, data) in enumerate(entries):
             schema = writer.register_schema(kind, "ros2msg", b"") if kind else 0
-            channel = writer.register_channel(topic, encoding, schema)
+            channel = writer.register_channel(topic, encoding, schema) if topic else 9999
             writer.add_message(channel, stamp, data, stamp)
         writer.finish()
     return path
@@ -255,7 +255,7 @@ def test_a_topic_that_is_needed_and_does_not_fit_is_named(
     assert told in line
 
 
-def test_a_topic_not_needed_is_left_out_if_it_is_of_another_type(
+def test_a_topic_not_needed_is_left_out_if_it_is_of_another_type_or_unknown(
     recorded: Recorded, entries: list[tuple[str, str, str, bytes]], tmp_path: Path
 ) -> None:
     twist = [
@@ -267,6 +267,8 @@ def test_a_topic_not_needed_is_left_out_if_it_is_of_another_type(
     assert log.damage == (f"{told}needed",)
     log = read_flight(_write(tmp_path / "x.mcap", [(n, "", e, d) for n, _, e, d in entries]))
     assert log.damage == ()  # without definitions
+    unknown = read_flight(_write(tmp_path / "x.mcap", [*entries, ("", "", "", b"?")]))
+    assert unknown.damage == ("x.mcap: 1 messages of an unknown topic",)
     for name in COLUMNS:
         np.testing.assert_array_equal(getattr(log, name), getattr(recorded.log, name))
 

@@ -71,7 +71,7 @@ def test_a_start_with_a_rate_turns_the_robot_about_its_centre_of_mass(
 
 
 def test_plant_starts_at_rest_where_it_is_told(paper_robot: Robot) -> None:
-    """The quaternion is normalised, degrees become radians."""
+    """The quaternion is normalised, degrees become radians; of a joint not told they are 0."""
     start = {"initial_joints_deg": ANGLES_DEG, "initial_quaternion": [2.0, 0.0, -2.0, 0.0]}
     plant = plant_of(paper_robot, **start)
     state = plant.state
@@ -79,6 +79,8 @@ def test_plant_starts_at_rest_where_it_is_told(paper_robot: Robot) -> None:
     np.testing.assert_allclose(np.degrees(state.joint_positions), ANGLES_DEG)
     np.testing.assert_allclose(state.quaternion, [np.sqrt(0.5), 0.0, -np.sqrt(0.5), 0.0])
     assert kinetic_energy(paper_robot, state) == 0.0
+    one_joint = random_robot(np.random.default_rng(1), 1)
+    assert Plant(one_joint, PlantSettings(), PERIOD).state.joint_positions == 0.0
 
 
 @pytest.mark.parametrize(
