@@ -171,20 +171,3 @@ def test_wheels_hold_against_pulses_when_these_come() -> None:
 def test_ideal_base_has_no_allocation() -> None:
     allocation = Allocation.build(1, BaseActuatorSettings(), AllocationSettings(), PERIOD)
     assert allocation.is_used == 0.0
-
-
-@pytest.mark.parametrize(
-    ("key", "value"),
-    [
-        ("unload_to", 0.8),
-        ("schmitt_off", 1.0),
-        ("modulation", "pulse"),
-        ("gain", 1.0),
-        ("dump", "wheels"),
-        ("dump", ""),
-        ("magnetic_gain", -1e-3),
-    ],
-)
-def test_settings_that_cannot_be(key: str, value: Any) -> None:
-    with pytest.raises(ValueError, match=key):
-        AllocationSettings(**{key: value})

@@ -23,7 +23,7 @@ from space_robot.flight.simulate import simulate
 from space_robot.processes.interruption import Interrupted
 from space_robot.scenario.node_settings import option_parameters
 from space_robot_control.controller.gains import split_gains
-from space_robot_control.laws import ControlLaw, LawGains, find_law, importable_name, laws
+from space_robot_control.laws import ControlLaw, LawGains, find_law, importable_name
 from space_robot_control.laws.base import LawError, force_of
 from space_robot_control.laws.names import NotTrustedError, is_plain
 from space_robot_msgs_py.bag.reader import read_flight
@@ -144,56 +144,12 @@ def test_files_of_one_name_in_two_folders_are_two_laws(folder: Path) -> None:
         assert controller["controller"] == importable_name(law)
 
 
-@pytest.mark.parametrize(
-    ("name", "hint"),
-    [
-        ("my_law:Mine", "name the file, my_law.py:Mine"),
-        ("other.my_law:Mine", "name the file, other/my_law.py:Mine"),
-        ("my_law.py", "name the class as well"),
-        ("nothing.py:Mine", "no such file"),
-        ("nothing:Mine", "PYTHONPATH"),
-        ("a" * 300 + ":Mine", "PYTHONPATH"),
-        ("a\0.py:Mine", "cannot be read"),
-        *((f"{name}", "") for name in (":", "x:", ".x:y", "..:y", "\x00:y", "a b:c", "json:X")),
-        ("pid", "unknown controller 'pid'"),
-        ("space_robot_control.laws.ctc:Pid", "has no attribute 'Pid'"),
-        ("space_robot_control.laws.ctc:", "cannot be imported"),
-        ("space_robot_model.robot:Robot", "is not a ControlLaw"),
-        ("math:pi", "is not a ControlLaw"),
-        (":Law", "cannot be imported"),
-        ("space_robot_control.laws:ControlLaw", "is not a ControlLaw"),
-    ],
-)
-def test_what_to_do_is_said_and_nothing_is_run(folder: Path, name: str, hint: str) -> None:
-    with pytest.raises(InputError) as caught:
-        find_law(name)
-    assert hint in str(caught.value)
-    assert len(str(caught.value)) < 500
-    assert not (folder / "was_run").exists()
-    if "space_robot" in name or name in ("pid", "math:pi"):
-        assert repr(name) in str(caught.value)
-        for allowed in (*laws(), "module:Class"):
-            assert allowed in str(caught.value)
-
-
-@pytest.mark.parametrize(
-    ("code", "said"),
-    [
-        ("raise RuntimeError('half\\nmade')", r"bad\.py:X.*RuntimeError: half made"),
-        ("1 / 0", "ZeroDivisionError: division by zero"),
-        ("class X(", "SyntaxError"),
-    ],
-)
-def test_a_file_that_fails_is_one_line_and_can_be_mended(
-    folder: Path, code: str, said: str
-) -> None:
-    (folder / "bad.py").write_text(code)
-    with pytest.raises(InputError, match=said):
+def test_a_file_that_fails_can_be_mended(folder: Path) -> None:
+    (folder / "bad.py").write_text("raise RuntimeError('half\\nmade')")
+    with pytest.raises(InputError, match=r"bad\.py:X.*RuntimeError: half made"):
         find_law("bad.py:X")
     (folder / "bad.py").write_text(CODE.format(name="mended").replace("Mine", "X"))
     assert find_law("bad.py:X").name == "mended"
-    with pytest.raises(InputError, match=r"unknown class 'Mien' of my_law\.py.*Mine"):
-        find_law("my_law.py:Mien")
 
 
 def test_a_campaign_keeps_the_digest_of_a_laws_file(folder: Path) -> None:

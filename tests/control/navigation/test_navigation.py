@@ -29,7 +29,7 @@ from space_robot_control.navigation.settings import (
 from space_robot_model.dynamics.attitude import compose, from_small_rotation, to_small_rotation
 from space_robot_model.hardware.sensors import SensorSettings
 from space_robot_model.robot import Robot
-from space_robot_msgs_py.errors import InputError, UnusableStateError
+from space_robot_msgs_py.errors import UnusableStateError
 from space_robot_msgs_py.samples import RobotState
 
 Array = NDArray[np.float64]
@@ -152,18 +152,6 @@ def test_after_a_jump_back_in_time_everything_begins_anew(again: int) -> None:
     np.testing.assert_array_equal(estimates(used, ticks), estimates(fresh, ticks))
 
 
-@pytest.mark.parametrize(
-    ("key", "value", "why"),
-    [
-        ("tracker_delay", 2.0, r"tracker_delay must be at most 4094 ticks, 0.4094 s, got 2 s"),
-        ("tracker_boresight", [0.0, 1e-5, 0.0], r"tracker_boresight must have a norm of"),
-    ],
-)
-def test_what_does_not_fit_is_refused(key: str, value: object, why: str) -> None:
-    with pytest.raises(InputError, match=why):
-        Navigation.build(N, NAVIGATION.model_copy(update={key: value}), 1e-4)
-
-
 @pytest.mark.parametrize("angle", [5e-324, 1e-200, LEAST, 1e3])
 @pytest.mark.parametrize("rate", [0.0, 5e-324, LEAST, 1e3])
 def test_noises_whose_squares_vanish_give_a_filter(angle: float, rate: float) -> None:
@@ -270,23 +258,6 @@ def test_nothing_is_assumed_to_be_perfect() -> None:
     assert found["tracker_across"] == found["tracker_about"] == LEAST_ANGLE
     assert found["gyro_angle_walk"] == found["joint_angle_noise"] == LEAST
     assert found["joint_rate_noise"] == LEAST
-
-
-@pytest.mark.parametrize(
-    ("text", "why"),
-    [
-        ("plant_node: {ros__parameters: {gyro: {noise: -1}}}", "sensors.yaml: gyro.noise: "),
-        ("plant_node: {gyro: {noise: 1}}", "sensors.yaml: plant_node: 'ros__parameters'"),
-        (None, "sensors.yaml"),
-    ],
-)
-def test_a_wrong_file_is_named(tmp_path: Path, text: str | None, why: str) -> None:
-    """Also where one number alone is not given."""
-    path = tmp_path / "sensors.yaml"
-    if text:
-        path.write_text(text)
-    with pytest.raises(InputError, match=why):
-        completed(NAVIGATION.model_copy(update={"gyro_bias": -1.0}), str(path), PERIOD)
 
 
 # Quaternions

@@ -167,35 +167,10 @@ def test_the_report_is_of_the_excerpt_and_so_are_unanswered_ticks(log: FlightLog
     assert excerpt(other, None, 0.05).unanswered == 1
 
 
-@pytest.mark.parametrize(
-    ("from_s", "to_s", "text"),
-    [
-        (0.1, 0.1, "--from 0.1 --to 0.1: the start must come before the end"),
-        (-1.0, None, "--from -1: outside the flight, which lasts from 0 to 0.3 s"),
-        (None, 0.31, "--to 0.31: outside the flight"),
-        (0.3, None, "--from 0.3: outside the flight"),
-        (None, 0.0, "--to 0: outside the flight"),
-        (float("nan"), None, "outside the flight"),
-        (0.1001, 0.1002, "no tick lies between"),
-    ],
-)
-def test_wrong_times_are_named(
-    log: FlightLog, from_s: float | None, to_s: float | None, text: str
-) -> None:
-    with pytest.raises(InputError, match=text):
-        excerpt(log, from_s, to_s)
-
-
 FILE = """
 import numpy as np
 def largest_error(log): return np.abs(log.joint_positions - log.reference_joints[:, 0]).max()
 def ticks(log): return log.ticks
-def raises(log): return 1 / (log.ticks - log.ticks)
-def nan(log): return float("nan")
-def array(log): return np.zeros(3)
-def text(log): return "3"
-def leaves(log): raise SystemExit("away")
-NUMBER = 3
 """
 
 
@@ -235,34 +210,6 @@ def test_it_is_a_number_of_a_flight_and_analyze_shows_it(bag: Path) -> None:
     assert all("largest_error" in text for text in (one.stdout, both.stdout, page))
     excerpt = run(str(bag), *own, "--to", "0.01", "--json")
     assert json.loads(excerpt.stdout)["metrics"]["rows"] == 20.0
-
-
-@pytest.mark.parametrize(
-    ("metric", "why"),
-    [
-        ("mine.py:raises", "failed: ZeroDivisionError: division by zero (mine.py, line 5)"),
-        ("mine.py:leaves", "metric leaves failed: SystemExit: away (mine.py, line 9)"),
-        ("mine.py:nan", "metric nan: the function must return a finite number, got nan"),
-        ("mine.py:array", "metric array: the function must return one number, got an array of"),
-        ("mine.py:text", "metric text: the function must return one number, got '3'"),
-        ("mine.py:tick", "metric 'mine.py:tick': unknown function 'tick' of mine.py"),
-        ("mine.py:NUMBER", "metric 'mine.py:NUMBER' is no function"),
-        ("mine.py", "metric 'mine.py': name the function as well, mine.py:FUNCTION"),
-        ("none.py:x", "none.py: no such file (did you mean mine.py?) (paths are from the current"),
-        ("mine:ticks", "the current folder is not searched for modules: name the file, mine.py:"),
-        ("no_such:x", "modules are searched for on PYTHONPATH; a file is named by its path"),
-        ("ticks", "metric 'ticks': a metric is named as file.py:FUNCTION or module:FUNCTION"),
-        ("a b=mine.py:ticks", "'a b' is no name of a metric"),
-        ("mine.py:ticks & ticks=mine.py:nan", "ticks is the name of two: name one as OTHER="),
-    ],
-)
-def test_a_wrong_one_is_one_line(metric: str, why: str, bag: Path) -> None:
-    words = [word for name in metric.split(" & ") for word in ("--metric", name)]
-    result = run(str(bag), *words)
-    assert isinstance(result.exception, InputError), result.output
-    assert result.exception.exit_code == 2
-    assert why in str(result.exception)
-    assert "\n" not in str(result.exception)
 
 
 def outside(log: FlightLog) -> float:

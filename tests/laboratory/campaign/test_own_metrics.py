@@ -137,25 +137,6 @@ def test_a_function_of_this_session_is_flown_in_this_process() -> None:
             own.run(3, 7, **options)  # type: ignore[arg-type]
 
 
-@pytest.mark.parametrize(
-    ("metrics", "why"),
-    [
-        ({"m": "mine.py:nan"}, "metric m: the function must return a finite number, got nan"),
-        ({"m": "mine.py:none"}, "campaign: metrics: metric 'mine.py:none': unknown function"),
-        ({"m": "other.py:none"}, "campaign: metrics: metric 'other.py:none': other.py: no such"),
-        ({"m": "mine"}, "metrics: metric 'mine': a metric is named as file.py:FUNCTION"),
-        ({"m": 3}, "metrics: a function or file.py:FUNCTION was expected, got 3"),
-        ({"a b": "mine.py:nan"}, "metrics: 'a b' is no name of a metric"),
-        ({"attitude.rms": "mine.py:nan"}, "'attitude.rms' is no name of a metric"),
-    ],
-)
-def test_a_mistake_is_told_before_the_first_flight(metrics: dict[str, Any], why: str) -> None:
-    with pytest.raises(InputError) as told:
-        campaign(metrics=metrics, require={}).run(3, 7, "one", workers=0)
-    assert why in str(told.value)
-    assert "\n" not in str(told.value)
-
-
 def test_a_function_that_fails_in_a_run_is_that_runs_row() -> None:
     content: dict[str, Any] = {
         "laws": ["tde_stc"],

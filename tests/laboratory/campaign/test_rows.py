@@ -17,7 +17,6 @@ from space_robot.campaign.row import fly
 from space_robot.campaign.row.fly import RowFlyer
 from space_robot.campaign.row.measure import (
     Measured,
-    check_requirements,
     measure_row,
     planned,
     row_columns,
@@ -25,7 +24,6 @@ from space_robot.campaign.row.measure import (
 )
 from space_robot.campaign.row.row import Row, Task
 from space_robot.campaign.study import Requirement, Study
-from space_robot_msgs_py.errors import InputError
 
 
 def numbers_of(flown: FlownFlight, **options: Any) -> Measured:
@@ -107,33 +105,6 @@ def test_the_drift_of_a_free_base_is_that_of_the_report() -> None:
     assert "attitude.max" not in metrics
     expected = angle.reshape(100, 6).max(axis=1)
     np.testing.assert_allclose(found.bands["attitude_drift"], expected, rtol=1e-6)
-
-
-@pytest.mark.parametrize(
-    ("demand", "said"),
-    [
-        ({"metric": "attitude.mx"}, "in my.yaml: require.p.metric: did you mean attitude.max"),
-        ({"metric": "attitude.max", "from_s": 1.2}, "from_s: must be before the end .*1.2 s"),
-        (
-            {"metric": "joints_1_3.rms", "from_s": 0.3001, "to_s": 0.3004},
-            r"my.yaml: require.p.to_s: no tick between 0.3001 and 0.3004 s",
-        ),
-        (
-            {"metric": "base_torque.ripple", "from_s": 0.5},
-            "my.yaml: require.p.metric: base_torque.ripple needs 1 s of flight, got 0.7 s",
-        ),
-        (
-            {"metric": "half_cone.jitter_rms", "to_s": 0.5},
-            r"half_cone.jitter_rms needs 1 s of flight \(pointing.window_s\), got 0.5005 s",
-        ),
-    ],
-)
-def test_what_no_flight_has_cannot_be_required(
-    flown: FlownFlight, demand: dict[str, object], said: str
-) -> None:
-    require = {"p": Requirement.model_validate({**demand, "below": 1.0, "in": 0.9})}
-    with pytest.raises(InputError, match=said):
-        check_requirements(flown.flight, require, "my.yaml")
 
 
 def test_a_mission_of_segments_has_the_error_of_its_tool() -> None:

@@ -49,52 +49,6 @@ def test_a_wrong_file_is_refused_in_one_line_with_its_name(
     assert caught.value.exit_code == 2
 
 
-NO_FIELD = (
-    "actuators wheels_and_torquers: magnetic_torquers need an orbit with a magnetic field: "
-    "--orbit NAME, with magnetism.strength above 0"
-)
-IDEAL_ONLY = {"base_torque_limit": 1.0}, {"faults": ["saturate_base@1:0.5"]}
-
-
-@pytest.mark.parametrize(
-    ("values", "said"),
-    [
-        ({"sensors": "best"}, "unknown sensor 'best': choose one of coarse, fine, ideal"),
-        ({"actuators": "best"}, "unknown actuator 'best': choose one of ideal, none, small"),
-        ({"actuators": "none", **IDEAL_ONLY[0]}, "base_torque_limit is for base_actuation ideal"),
-        ({"actuators": "wheels", **IDEAL_ONLY[0]}, "base_torque_limit is for base_actuation ideal"),
-        ({"actuators": "thrusters", **IDEAL_ONLY[1]}, "fault saturate_base is for base_actuation"),
-        ({"actuators": "wheels_and_torquers"}, NO_FIELD),
-        ({"actuators": "wheels_and_torquers", "orbit": "iss", "magnetism.strength": 0.0}, NO_FIELD),
-    ],
-)
-def test_what_does_not_fit_is_refused_in_one_line(values: dict[str, Any], said: str) -> None:
-    with pytest.raises(InputError) as caught:
-        Plant(PAPER, resolved(**values), 5e-4)
-    assert said in str(caught.value)
-    assert "\n" not in str(caught.value)
-
-
-@pytest.mark.parametrize(
-    ("part", "key", "zero_is_allowed"),
-    [
-        *(("wheels", key, True) for key in ("max_torque", "max_momentum", "coulomb", "viscous")),
-        ("wheels", "rotor_inertia", False),
-        ("magnetic_torquers", "max_dipole", False),
-        *(("thrusters", key, True) for key in ("shortest_pulse", "delay")),
-        *(("thrusters", key, False) for key in ("force", "specific_impulse")),
-    ],
-)
-def test_sizes_are_not_negative(part: str, key: str, zero_is_allowed: bool) -> None:
-    """The smallest number below zero is refused, and named; zero only where it means something."""
-    for value in (-5e-324, 0.0):
-        if value == 0.0 and zero_is_allowed:
-            resolved(**{f"{part}.{key}": [value]})
-            continue
-        with pytest.raises(InputError, match=rf"{part}\.{key}"):
-            resolved(**{f"{part}.{key}": [value]})
-
-
 @pytest.mark.parametrize(
     ("kind", "path"), [(kind, path) for kind in FILES for path in FILES[kind]], ids=str
 )

@@ -167,19 +167,6 @@ def test_springs_and_tools_of_a_yaml() -> None:
     assert turned.friction[1] == JointFriction(0.3, 0.0)
 
 
-@pytest.mark.parametrize(
-    ("more", "said"),
-    [
-        ({"passive": {"wrist": SPRING}}, r"unknown passive joint 'wrist' of given\.yaml"),
-        ({"urdf_text": GOOD}, r"given\.yaml: robot: either urdf or urdf_text"),
-        ({"root": "hull"}, "unknown key"),
-    ],
-)
-def test_wrong_keys_of_a_yaml_are_refused(more: dict[str, Any], said: str) -> None:
-    with pytest.raises(InputError, match=said):
-        of_yaml(**more)
-
-
 def test_a_yaml_is_read_in_its_folder_or_has_the_text(tmp_path: Path) -> None:
     shutil.copy(ARM, tmp_path)
     (tmp_path / "robot.yaml").write_text("robot: {urdf: arm.urdf, base: fore, name: mine}\n")

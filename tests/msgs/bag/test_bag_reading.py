@@ -179,21 +179,6 @@ def test_a_remapped_topic_stands_for_ours(
     assert_same_flight(log, recorded.log)
 
 
-@pytest.mark.parametrize(
-    ("remap", "told"),
-    [
-        ({"/x": "/joint_states"}, "no topic /x to remap; it has /base/state, "),
-        ({"/base/state": "/y"}, "unknown topic '/y' to take /base/state for: choose one of"),
-        ({"/clock": "/command", "/x": "/command"}, "more than one topic is to be taken for"),
-    ],
-)
-def test_a_remapping_that_makes_no_sense_is_told(
-    recorded: Recorded, remap: dict[str, str], told: str
-) -> None:
-    with pytest.raises(InputError, match=told):
-        read_flight(recorded.folder, remap)
-
-
 def recorded_as(
     folder: Path, recorded: Recorded, namespace: str, names: dict[str, str] | None = None
 ) -> Path:

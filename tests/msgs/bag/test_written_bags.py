@@ -262,20 +262,6 @@ def test_a_bag_is_never_overwritten_and_of_two_recorders_the_first_has_it(tmp_pa
 
 
 @pytest.mark.parametrize(
-    ("parameter", "value", "said"),
-    [
-        ("compression", "gzip", "'none', 'lz4' or 'zstd', got 'gzip'"),
-        ("split_size", "1K", "65536 to 4611686018427387904 bytes"),
-        ("split_size", -5, "split_size"),
-        ("split_size", "many", "split_size: could not parse .* got 'many'"),
-    ],
-)
-def test_bad_options_are_named(parameter: str, value: object, said: str) -> None:
-    with pytest.raises(InputError, match=said):
-        Flight(resolve(Scenario(parameters={"recorder": {parameter: value}})))
-
-
-@pytest.mark.parametrize(
     ("given", "size"), [("500K", 500_000), ("100M", 10**8), ("2G", 2 * 10**9), ("1MiB", 2**20)]
 )
 def test_sizes_as_people_write_them(given: str, size: int) -> None:

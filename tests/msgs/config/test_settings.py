@@ -61,18 +61,6 @@ def test_a_file_may_speak_to_a_node_of_any_namespace(tmp_path: Path) -> None:
     assert node_parameters(path, "plant") == {}
 
 
-@pytest.mark.parametrize(
-    "below", ["{}", "3", "[ros__parameters]", "{a: 1}", "{z: 1}", "{ros__parameters: {}, z: 1}"]
-)
-def test_a_file_that_has_more_or_less_than_parameters_is_refused(
-    tmp_path: Path, below: str
-) -> None:
-    path = tmp_path / "case.yaml"
-    path.write_text(f"plant_node: {below}")
-    with pytest.raises(InputError, match="plant_node: 'ros__parameters' was expected below"):
-        node_parameters(path, "plant")
-
-
 def test_a_node_waits_for_listeners_to_what_it_sends_alone() -> None:
     assert PlantNodeSettings.resolve({"wait_for": ["a:/clock", "b", ""]}).wait_for[0] == "a:/clock"
     for schema, entry, sent in (
@@ -101,27 +89,6 @@ def test_every_law_has_tuned_and_default_gains(robot: str, axes: int) -> None:
         assert set(files) == set(laws())
         for name, path in files.items():
             read_gains(path, laws()[name], axes)
-
-
-@pytest.mark.parametrize(
-    ("content", "said"),
-    [
-        ({"h_bar": [1.0]}, "tde_stc.lambda: missing (slope of the sliding surface"),
-        ({"h_bar": [1.0, 2.0]}, "9 values (base x, y, z and the joints) or 1 were expected"),
-        ({"h_bar": [-1.0]}, "finite values above 0 (or nominal: as numbers all 0) were expected"),
-        ({"h_bar": ["x"]}, "numbers were expected, got ['x']"),
-        ({"k_9": [1.0]}, "unknown gain of tde_stc 'k_9'"),
-    ],
-)
-def test_bad_gains_name_file_key_and_value(
-    tmp_path: Path, content: dict[str, object], said: str
-) -> None:
-    path = tmp_path / "tde_stc.yaml"
-    path.write_text(yaml.safe_dump({"controller_node": {"ros__parameters": {"tde_stc": content}}}))
-    with pytest.raises(InputError) as caught:
-        read_gains(path, laws()["tde_stc"], 9)
-    assert said in str(caught.value)
-    assert str(path) in str(caught.value)
 
 
 def test_names_of_files_and_paths(tmp_path: Path) -> None:
@@ -186,13 +153,3 @@ def test_printed_gains_are_table_iv() -> None:
     ctc = build_law("ctc", settings, 9).gains
     np.testing.assert_array_equal(ctc.k_p, np.r_[7.5e6, [5e6] * 5, 5e4, 5e4, 8e3])
     np.testing.assert_array_equal(ctc.k_d, np.r_[[5e4] * 6, 2e3, 8e3, 1e2])
-
-
-def test_unknown_names_list_the_known_ones() -> None:
-    for find, said in (
-        (lambda: named_file("cases", "7"), "unknown case '7': choose one of 1, 2, 3, 4-1, 4-2"),
-        (lambda: gain_files("paper", "best"), "unknown gain set 'best' of robot 'paper': choose"),
-        (lambda: gain_files("mine", "default"), "unknown robot 'mine': choose one of "),
-    ):
-        with pytest.raises(InputError, match=said):
-            find()

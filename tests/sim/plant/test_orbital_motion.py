@@ -38,7 +38,6 @@ from strategies import random_quaternion, random_robot
 
 from space_robot_model.orbit.elements import state_of
 from space_robot_model.robot import Robot
-from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.samples import RobotState
 from space_robot_sim.environment.neighbouring_orbit import free_fall, hill_axes, target_state
 from space_robot_sim.environment.orbit import OrbitSettings
@@ -293,18 +292,3 @@ def test_the_plant_flies_the_same_body_to_the_same_place(has_j2: bool) -> None:
     (point,) = free_path(*state_of(orbit.orbital_elements), ticks * period, has_j2)
     found = np.concatenate([state.orbit_position, state.orbit_velocity])
     np.testing.assert_allclose(found, point, rtol=1e-11)
-
-
-@pytest.mark.parametrize(
-    ("motion", "orbit", "said"),
-    [
-        ({"angular_velocity": [900.0, 0.0, 1.0]}, NO_J2, r"motion\.angular_velocity: "),
-        ({}, OrbitSettings(), r"motion\.relative_to orbit needs an orbit: "),
-    ],
-)
-def test_what_cannot_be_followed_is_refused_in_one_line(
-    motion: dict[str, list[float]], orbit: OrbitSettings, said: str
-) -> None:
-    with pytest.raises(InputError, match=rf"target 'drifter': {said}") as caught:
-        target_state(target_of(**motion), orbit, 1000.0)
-    assert "\n" not in str(caught.value)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 import pytest
 from benches import PERIOD, N, a_state
@@ -12,11 +10,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 from oracles import rotation_of
-from pydantic import ValidationError
 from scipy.linalg import expm
 from scipy.spatial.transform import Rotation
 
-from space_robot_model.hardware.sensors import StarTrackerSettings
 from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.samples import RobotState
 
@@ -169,21 +165,3 @@ def test_a_blind_tracker_tells_what_it_told_last() -> None:
     assert shown[41:45] == [30] * 4
     assert shown[45:95] == [40] * 50
     assert shown[95:] == [90] * 5
-
-
-@pytest.mark.parametrize(
-    ("settings", "why"),
-    [
-        ({"rate": 2001.0}, "star_tracker.rate must be at most one .* a tick, 2000 Hz, got 2001"),
-        ({"rate": 1000.0, "delay": 1.0}, "star_tracker.delay holds 1000 measurements, at most 63"),
-    ],
-)
-def test_what_does_not_fit_is_refused(settings: dict[str, Any], why: str) -> None:
-    with pytest.raises(InputError, match=f"^{why}"):
-        Bench(star_tracker=settings)
-
-
-@pytest.mark.parametrize("boresight", [[0.0, 0.0, 0.0], [0.0, 1e9, 0.0], [1.0, 0.0]])
-def test_a_boresight_is_a_direction(boresight: list[float]) -> None:
-    with pytest.raises(ValidationError, match="boresight"):
-        StarTrackerSettings(boresight=boresight)
