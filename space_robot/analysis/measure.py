@@ -7,7 +7,7 @@ is added there; analysis, campaigns and the reference know it then.
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterable, Iterator
+from collections.abc import Collection, Container, Iterable, Iterator
 from fnmatch import fnmatchcase
 from functools import lru_cache
 from importlib import import_module
@@ -85,9 +85,15 @@ def measure(
 
 
 def evaluate(
-    flight: AnalysedLog, wanted: Collection[str] | None = None, window: Window | None = None
+    flight: AnalysedLog,
+    wanted: Collection[str] | None = None,
+    window: Window | None = None,
+    groups: Container[str] = GROUPS,
 ) -> tuple[dict[str, float], dict[str, str]]:
-    """Return metrics as `measure` does, and why there are none, by name of the group."""
+    """Return metrics as `measure` does, and why there are none, by name of the group.
+
+    ``groups``: names of the groups to compute, where no metrics are ``wanted``.
+    """
     first = flight.log.first_tick
     ticks = (window or Window()).ticks(first + flight.log.ticks, flight.period)
     rows = range(max(ticks.start - first, 0), max(ticks.stop - first, 0))
@@ -95,7 +101,7 @@ def evaluate(
         return {}, {}
     numbers: dict[str, float] = {}
     unavailable: dict[str, str] = {}
-    for group in _groups_of(wanted):
+    for group in _groups_of(wanted, groups):
         try:
             numbers |= group.evaluate(flight, rows)
         except InputError as error:
@@ -105,16 +111,16 @@ def evaluate(
     return numbers, unavailable
 
 
-def _groups_of(wanted: Collection[str] | None) -> Collection[MetricGroup]:
+def _groups_of(wanted: Collection[str] | None, groups: Container[str]) -> Collection[MetricGroup]:
     if wanted is None:
-        return GROUPS.values()
-    groups = {}
+        return [group for name, group in GROUPS.items() if name in groups]
+    chosen = {}
     for name in wanted:
         if (group := group_of(name)) is None:
             one_of(name, [template for _, template, _ in all_metrics()], "metric")
         else:
-            groups[group.name] = group
-    return groups.values()
+            chosen[group.name] = group
+    return chosen.values()
 
 
 def names(flight: AnalysedLog, groups: Iterable[str] | None = None) -> Iterator[str]:

@@ -17,18 +17,28 @@ from .described import actuators_of, event_labels, navigation_of, sensors_of, st
 from .errors import UNAVAILABLE
 from .measure import evaluate
 from .report_tables import comparison_table, sizing_table
+from .series import GROUPS
 from .sizing import ActuatorSet, load_requirements
 from .words import Report, law_of, notes, remarks, warnings
 
 if TYPE_CHECKING:
     import jinja2
 
+IN_BRIEF = (
+    *("errors", "steadiness", "drift", "navigation", "torques", "roughness", "ripple"),
+    *("wheel_saturation", "wheel_reversals", "standing", "beyond_limits", "effort_used"),
+    "missed_captures",
+)
+"""Groups of metrics that `rms_table`, its remarks and `warnings` show."""
 DESCRIBED = ("controller", "case", "gains", "robot")
 """Keys of a flight's description that a report repeats."""
 
 
 def analyze(
-    log: FlightLog, actuators: ActuatorSet | None = None, budget: PointingBudget | None = None
+    log: FlightLog,
+    actuators: ActuatorSet | None = None,
+    budget: PointingBudget | None = None,
+    in_brief: bool = False,
 ) -> dict[str, Any]:
     """Compute the flight's report, the same from a graph flight, an in-process one, or a bag.
 
@@ -39,6 +49,7 @@ def analyze(
         log: a flight.
         actuators: of the base, for the sizing; None: those that flew.
         budget: of the base's pointing; None: the default.
+        in_brief: True: without the metrics that the terminal does not show after a flight.
 
     Raises:
         InputError: no tick has both a state and a reference, or ``log`` is no flight.
@@ -46,21 +57,28 @@ def analyze(
     if not isinstance(log, FlightLog):
         raise InputError(f"log: a FlightLog was expected (load_bag reads one), got {short(log)}")
     flight = AnalysedLog(_without_gaps(log), budget, actuators.settings if actuators else None)
-    numbers, unavailable = evaluate(flight)
+    groups = _in_brief(flight) if in_brief else GROUPS
+    numbers, unavailable = evaluate(flight, groups=groups)
     pointing = None
     if flight.controls_base:
         pointing = {"points": flight.pointed_axis is not None, **flight.budget.model_dump()}
     else:
         unavailable = UNAVAILABLE | unavailable
+    is_sized = "sizing" in groups and "sizing" not in unavailable
     return {
         **_flown(flight, log.ticks),
         "pointing": pointing,
         "metrics": numbers,
-        "sizing": None if "sizing" in unavailable else _sizing(flight, actuators, numbers),
+        "sizing": _sizing(flight, actuators, numbers) if is_sized else None,
         "warnings": warnings(numbers),
         "unavailable": unavailable,
         **recording(flight.log),
     }
+
+
+def _in_brief(flight: AnalysedLog) -> list[str]:
+    has_hardware = flight.log.wheel_velocities.shape[1] or flight.log.thrusts.shape[1]
+    return [*IN_BRIEF, *(["sizing"] if has_hardware else [])]
 
 
 def _flown(flight: AnalysedLog, flight_ticks: int) -> dict[str, Any]:

@@ -45,10 +45,15 @@ class FlownFlight:
         bag: Path | None,
         log: FlightLog,
         keep_log: bool = True,
+        in_brief: bool = False,
     ) -> None:
-        """``bag``: its folder, if recorded; ``keep_log``: False: only its report is kept."""
+        """``bag``: its folder, if recorded; ``keep_log``: False: only its report is kept.
+
+        ``in_brief``: only what the terminal shows is in the report, see `analyze`.
+        """
         self.flight, self.ending, self.bag = flight, ending, bag
         self._log: FlightLog | None = log
+        self._in_brief = in_brief
         if not keep_log:
             _ = self._report
             self._log = None
@@ -121,7 +126,7 @@ class FlownFlight:
     @cached_property
     def _report(self) -> dict[str, Any]:
         try:
-            return analyze(self.log)
+            return analyze(self.log, in_brief=self._in_brief)
         except InputError:
             return {}
 
@@ -280,15 +285,19 @@ def fly_in_process(
     bag: Path | None = None,
     progress: Callable[[float], object] | bool | None = None,
     keep_log: bool = True,
+    in_brief: bool = False,
 ) -> FlownFlight:
-    """Fly a checked flight from the present state of its plant; see `Scenario.fly`."""
+    """Fly a checked flight from the present state of its plant; see `Scenario.fly`.
+
+    ``in_brief``: see `FlownFlight`.
+    """
     if bag:
         check_bag_path(bag)
     compile_kernels(bool(flight.plant.names.actuators))  # has a progress line of its own
     if progress is True:
         _ = flight.supervisor  # compiled, or refused, before the line begins
         with flight_progress(flight.ticks * flight.period, flight.law.name) as show_time:
-            return fly_in_process(flight, bag, show_time, keep_log)
+            return fly_in_process(flight, bag, show_time, keep_log, in_brief)
 
     def show(tick: int) -> None:
         if callable(progress):
@@ -300,4 +309,4 @@ def fly_in_process(
         if error.log is None:
             raise
         log, ending = error.log, Ending.early(error, flight.period)
-    return FlownFlight(flight, ending, bag, log, keep_log)
+    return FlownFlight(flight, ending, bag, log, keep_log, in_brief)

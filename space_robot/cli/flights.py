@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from contextlib import suppress
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -53,7 +54,7 @@ def fly(as_json: bool, bag: Path | None, **options: Any) -> None:
     check_bag_path(bag)
     _ = flight.supervisor  # compiled, or refused, before anything is begun
     try:
-        report = fly_graph(flight, bag, analyze, remarks_on(flight))
+        report = fly_graph(flight, bag, partial(analyze, in_brief=not as_json), remarks_on(flight))
     except FlightError as error:
         if as_json:
             metrics: dict[str, Any] = {}
@@ -104,7 +105,7 @@ def simulate(as_json: bool, bag: Path | None, **options: Any) -> None:
         def progress(simulated_s: float) -> None:
             show(simulated_s, f"{simulated_s / (time.monotonic() - began):.0f} times real time")
 
-        flown = fly_in_process(flight, bag, progress, keep_log=False)
+        flown = fly_in_process(flight, bag, progress, keep_log=False, in_brief=not as_json)
     if as_json or flown.metrics:
         show_report(flown.report(), as_json)
     if bag and flown.metrics and not as_json:

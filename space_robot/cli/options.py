@@ -326,5 +326,5 @@ def remarks_on(flight: Flight) -> list[str]:
             on_thin_margin=tries_margin,
             nominal=flight.robot,
         ),
-        *limit_remarks(robot, flight.mission_settings),
+        *limit_remarks(robot, flight.mission.pieces),
     ]

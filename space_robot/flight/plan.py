@@ -14,7 +14,6 @@ from space_robot_control.flight_code.supervisors import supervisor_of
 from space_robot_control.laws import ControlLaw
 from space_robot_msgs_py.errors import InputError
 from space_robot_sim.plant.plant import Plant
-from space_robot_sim.plant.report import plant_description
 
 from ..processes.software import commit, versions
 from ..scenario.resolve import resolve
@@ -81,7 +80,7 @@ class Flight:
 
         The flight code in C is compiled, or the flight computer greeted, at the first request.
         """
-        return supervisor_of(self.controller, list(self.laws.values()), self.controller_settings)
+        return supervisor_of(self.controller, self.laws.values(), self.controller_settings)
 
     def check_in_process(self) -> None:
         """Check that the flight can run in one process: no option needs a graph of nodes."""
@@ -110,17 +109,21 @@ class Flight:
 
     @property
     def brief(self) -> dict[str, Any]:
-        """What metrics need of `description`; a hundred times faster."""
+        """What metrics and reports need of `description`; a hundred times faster."""
         if self.mission.leads_tool:  # its path is in the scenario
             return self.description
-        return plant_description(self.robot, {}, self.plant, self.plant_settings)
+        return self.scenario.brief(self.plant, {}) | self._beginning
+
+    @property
+    def _beginning(self) -> dict[str, Any]:
+        return {"start_step": self.start_step} if self.start_step else {}
 
     @property
     def description(self) -> dict[str, Any]:
         """Description of the flight for its bag, sufficient to repeat it on any machine."""
         return {
             **self.scenario.description(self.plant),
-            **({"start_step": self.start_step} if self.start_step else {}),
+            **self._beginning,
             "versions": versions(),
             "commit": commit(),
         }

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 
 from space_robot_control.allocation.settings import assumed_actuators
-from space_robot_control.controller.gains import build_laws
+from space_robot_control.controller.gains import Laws
 from space_robot_control.controller.law_choice import NoLaw, parse_swaps
 from space_robot_control.controller.settings import OF_THE_SET
 from space_robot_control.guidance.mission import Mission
@@ -109,14 +110,14 @@ def _mission(settings: FlightSettings, robot: Robot) -> Mission:
             raise InputError(f"{file}: {error}") from None
 
 
-def _laws(scenario: Scenario, settings: FlightSettings, axes: int) -> dict[str, ControlLaw]:
+def _laws(scenario: Scenario, settings: FlightSettings, axes: int) -> Mapping[str, ControlLaw]:
     if scenario.controller is None:
         return {NoLaw.name: NoLaw({}, settings.plant.period, axes)}
     own = resolve_law(scenario.controller)
     with explained_by("gains"):
         if not scenario.has_chosen_law:  # a robot's folder runs no code by naming it
             one_of(settings.controller.controller, known_laws(), "controller", f" of {OF_THE_SET}")
-        return build_laws(settings.controller, axes, settings.gains, own or "")
+        return Laws(settings.controller, axes, settings.gains, own or "")
 
 
 def _assumed_actuators(

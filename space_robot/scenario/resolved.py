@@ -155,19 +155,21 @@ class ResolvedScenario(FlightSettings):
             if name not in ALWAYS_SHOWN and optional.get(name, option.default) != option.default
         }
 
-    def description(self, plant: Plant) -> dict[str, Any]:
-        """Return the description kept in a bag, sufficient to repeat the flight.
+    def brief(self, plant: Plant, robot_file: Mapping[str, Any]) -> dict[str, Any]:
+        """Return what reports and metrics need of the `description`; much faster.
 
         Args:
             plant: made from it.
+            robot_file: numbers of the plant's robot.
         """
-        robots, controller = self.robots.description, self.controller
-        assumed = actuators(self.assumed_actuators)
-        is_other = self.plant.base_actuation != "ideal" and assumed != actuators(self.plant)
-        numbers = controller.filter_settings
+        controller, numbers = self.controller, self.controller.filter_settings
+        assumed, is_other = {}, False
+        if self.plant.base_actuation != "ideal":
+            assumed = actuators(self.assumed_actuators)
+            is_other = assumed != actuators(self.plant)
         return {
             "controller": self.law.name,
-            **plant_description(self.robots.plant, robots["robot_file"], plant, self.plant),
+            **plant_description(self.robots.plant, robot_file, plant, self.plant),
             **({"controller_base_actuators": assumed} if is_other else {}),
             "gains": controller.gains,
             **({"own_gains": self.own_gains} if self.own_gains else {}),
@@ -182,6 +184,16 @@ class ResolvedScenario(FlightSettings):
             **({"swaps": self.swap_texts} if self.swap_texts else {}),
             **({"restart_controller": True} if self.options.restart_controller else {}),
             **({"without": list(self.options.without)} if self.options.without else {}),
+        }
+
+    def description(self, plant: Plant) -> dict[str, Any]:
+        """Return the description kept in a bag, sufficient to repeat the flight.
+
+        ``plant``: made from it.
+        """
+        robots = self.robots.description
+        return {
+            **self.brief(plant, robots["robot_file"]),
             "parameters": self.parameters,
             "scenario": {k: v for k, v in self.tree.items() if k not in ("robot", "plant_robot")},
             "gains_used": self.gains_used,

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
-from space_robot_control.guidance.limits import effort_remarks, turn_remarks
-from space_robot_control.guidance.mission import Mission, MissionSettings
+from space_robot_control.guidance.courses import Piece
+from space_robot_control.guidance.limits import ROUNDING, turn_remarks
+from space_robot_control.guidance.mission import MissionSettings
 from space_robot_control.laws import CompiledLaw, ControlLaw
 from space_robot_control.laws.base import CONSTANT_INERTIA, NO_ESTIMATE
 from space_robot_control.navigation.rate_filters import low_pass_weight
@@ -17,13 +19,7 @@ from space_robot_msgs_py.errors import InputError
 
 from .closed_loop import RigidLoop
 from .gain_check import estimate_spectrum
-from .inertia import (
-    Posture,
-    inertia_along,
-    postures_along,
-    sampled_reference,
-    semi_floating_inertia,
-)
+from .inertia import Posture, inertia_along, postures_along, semi_floating_inertia
 from .linear_law import linear_law
 from .spectrum import LEAST_MARGIN
 
@@ -116,22 +112,35 @@ def _why_it_is_unsound(
     )
 
 
-def limit_remarks(robot: Robot, mission: MissionSettings) -> list[str]:
-    """Return a warning for each joint whose limit of effort the mission exceeds.
+def limit_remarks(robot: Robot, pieces: Sequence[Piece]) -> list[str]:
+    """Return a warning for each joint whose limit of effort the pieces of a mission exceed.
 
     The force is that of acceleration only, with constant attitude and locked passive joints:
     friction, velocity terms and control errors are not included.
     """
-    try:
-        planned = Mission(robot, mission, COARSE)
-    except InputError:  # the flight itself reports it
-        return []
-    remarks = [f"warning: {text}" for text in turn_remarks(robot, planned.pieces)]
-    has_limits = np.isfinite([limits.effort for limits in robot.limits]).any()
-    if not has_limits or not planned.duration:
+    remarks = [f"warning: {text}" for text in turn_remarks(robot, pieces)]
+    if not np.isfinite([limits.effort for limits in robot.limits]).any():
         return remarks
-    shortest = min(piece.end - piece.begin for piece in planned.pieces)
-    joints = sampled_reference(robot, mission, min(COARSE, shortest / A_LEG)).joints
+    counts = (max(A_LEG, math.ceil((piece.end - piece.begin) / COARSE)) + 1 for piece in pieces)
+    legs = zip(pieces, counts, strict=True)
+    motions = [each.joints.at(np.linspace(each.begin, each.end, count)) for each, count in legs]
+    joints = np.concatenate(motions)
     inertia = semi_floating_inertia(robot.nominal, joints[:, 0])[:, 3:, 3:]
     force = np.einsum("kij,kj->ki", inertia, joints[:, 2])
     return remarks + [f"warning: mission: {text}" for text in effort_remarks(robot, force)]
+
+
+def effort_remarks(robot: Robot, force: Array) -> list[str]:
+    """Return a remark on each joint whose ``force`` (K, n), N m or N, is above its limit."""
+    largest = np.abs(force).max(axis=0, initial=0.0)
+    return [
+        f"{name} needs {most:.3g} {unit} and more, its limit is {limits.effort:.3g} {unit}"
+        for name, most, limits, unit in zip(
+            robot.joint_names,
+            largest.tolist(),
+            robot.limits,
+            np.where(robot.is_prismatic[: robot.n], "N", "N m").tolist(),
+            strict=True,
+        )
+        if most > limits.effort * (1.0 + ROUNDING)
+    ]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -153,29 +153,50 @@ def build_law(
         ) from error
 
 
-def build_laws(
-    settings: ControllerNodeSettings,
-    axes: int,
-    overrides: Mapping[str, Tree] | None = None,
-    own: str | type[ControlLaw] | ControlLaw = "",
-) -> dict[str, ControlLaw]:
-    """Build all laws of a controller, by name: the law in force first, then the gain set's.
+class Laws(Mapping[str, ControlLaw]):
+    """All laws of a controller by name: the law in force first, then the gain set's.
 
-    ``overrides`` are gains by law that come over those of the files; ``own`` is the law in force as
-    a class or an object, see `build_law`.
+    A law is built when it is first asked for; most flights need one.
     """
-    overrides = overrides or {}
-    first = own if not isinstance(own, str) else find_law(settings.controller)
-    wanted: dict[str, str | type[ControlLaw] | ControlLaw] = {first.name: first}
-    brings_gains = isinstance(first, ControlLaw) or not first.required_gains()
-    available = available_laws(settings, brings_gains or first.name in overrides)
-    for name in available or overrides:  # without a gain set, the gains given are all there are
-        wanted.setdefault(name, name)
-    for name in overrides:
-        one_of(name, wanted, "law", f" in {PARAMETERS} (gains are <law>.<gain>)")
-    return {
-        name: build_law(law, settings, axes, overrides.get(name)) for name, law in wanted.items()
-    }
+
+    def __init__(
+        self,
+        settings: ControllerNodeSettings,
+        axes: int,
+        overrides: Mapping[str, Tree] | None = None,
+        own: str | type[ControlLaw] | ControlLaw = "",
+    ) -> None:
+        """Build the law in force, and those with ``overrides``: gains that come over the files'.
+
+        ``own`` is the law in force as a class or an object, see `build_law`.
+        """
+        self._settings, self._axes, self._overrides = settings, axes, overrides or {}
+        first = own if not isinstance(own, str) else find_law(settings.controller)
+        self._built = {first.name: self._build(first)}
+        brings_gains = isinstance(first, ControlLaw) or not first.required_gains()
+        may_lack = settings.gains == DEFAULT and (brings_gains or first.name in self._overrides)
+        self._files = _files_of(settings, may_lack)
+        for name in self._overrides:
+            _ = self[one_of(name, self, "law", f" in {PARAMETERS} (gains are <law>.<gain>)")]
+
+    def _build(self, law: type[ControlLaw] | ControlLaw) -> ControlLaw:
+        return build_law(law, self._settings, self._axes, self._overrides.get(law.name))
+
+    def __getitem__(self, name: str) -> ControlLaw:
+        if name not in self._built:
+            if name not in [*self]:
+                raise KeyError(name)
+            self._built[name] = self._build(find_law(name))
+        return self._built[name]
+
+    def __iter__(self) -> Iterator[str]:
+        yield (first := next(iter(self._built)))
+        # without a gain set, the gains given are all there are
+        names = sorted(self._files.keys() & laws().keys()) or self._overrides
+        yield from (name for name in names if name != first)
+
+    def __len__(self) -> int:
+        return sum(1 for _ in self)
 
 
 def _files_of(settings: ControllerNodeSettings, may_lack: bool) -> dict[str, Path]:
@@ -198,7 +219,6 @@ def split_gains(parameters: Mapping[str, Any]) -> tuple[Tree, dict[str, Tree]]:
     return own, gains
 
 
-def available_laws(settings: ControllerNodeSettings, may_lack: bool = False) -> list[str]:
-    """Return the names of this project's laws covered by the gains, which ``may_lack``."""
-    files = _files_of(settings, may_lack and settings.gains == DEFAULT)
-    return sorted(set(files) & set(laws()))
+def available_laws(settings: ControllerNodeSettings) -> list[str]:
+    """Return the names of this project's laws covered by the gains."""
+    return sorted(gain_files(settings.robot, settings.gains).keys() & laws().keys())

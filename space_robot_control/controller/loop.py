@@ -25,7 +25,7 @@ from space_robot_msgs_py.wire.stamp_guard import describe_new_time
 from ..allocation.settings import assumed_actuators
 from ..laws import ControlLaw
 from .controller import Controller
-from .gains import NOMINAL_H_BAR, build_laws, check_gains, gain_lengths, gain_range, split_gains
+from .gains import NOMINAL_H_BAR, Laws, check_gains, gain_lengths, gain_range, split_gains
 from .inputs import ReferenceInput, StateInput
 from .law_choice import LawChoice, parse_swaps
 from .settings import ControllerNodeSettings
@@ -220,7 +220,7 @@ class LawSet:
         """
         self._node, self._settings, self._axes = node, settings, axes
         _, gains = split_gains(overrides(node))
-        self._laws = build_laws(settings, axes, gains)
+        self._laws = Laws(settings, axes, gains)
         self.laws = list(self._laws.values())
         """All laws, that in force at the start first."""
         for law in self.laws:

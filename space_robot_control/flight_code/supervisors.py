@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -115,7 +115,7 @@ def bits(numbers: Array) -> NDArray[np.int64]:
 
 
 def supervisor_of(
-    controller: Controller, laws: Sequence[ControlLaw], settings: ControllerNodeSettings
+    controller: Controller, laws: Iterable[ControlLaw], settings: ControllerNodeSettings
 ) -> Supervisor:
     """Return the supervisor that the settings ask for.
 
@@ -134,7 +134,7 @@ def supervisor_of(
     from .instances import FlightComputer, FlightLibrary
     from .software import FlightSoftware
 
-    exported = Exported(FlightSoftware(controller, laws, [], limits, {}), settings.robot)
+    exported = Exported(FlightSoftware(controller, [*laws], [], limits, {}), settings.robot)
     if settings.controller_code.startswith("udp:"):
         _, host, port = settings.controller_code.split(":")
         return CodeSupervisor(controller, settings, FlightComputer(exported, host, int(port)))

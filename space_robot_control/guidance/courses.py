@@ -109,17 +109,15 @@ def quintic(u: Array) -> tuple[Array, Array, Array]:
 
 def knots(span: float) -> Array:
     """Return the times (K,) from 0 to ``span``, s, of the knots of a spline along a path."""
-    return np.linspace(0.0, span, _within(math.ceil(min(span / KNOT_S, MOST_KNOTS)) + 1))
+    count = math.ceil(min(span / KNOT_S, MOST_KNOTS)) + 1
+    return np.linspace(0.0, span, min(max(FEWEST_KNOTS, count), MOST_KNOTS))
 
 
 def sample_times(begin: float, end: float) -> Array:
     """Return the times (K,), s, at which a planned segment is checked."""
     span = end - begin
-    return np.linspace(begin, end, _within(round(min(span / KNOT_S, MOST_KNOTS)) + 1))
-
-
-def _within(count: int) -> int:
-    return min(max(FEWEST_KNOTS, count), MOST_KNOTS)
+    count = round(min(span / KNOT_S, MOST_KNOTS)) + 1
+    return np.linspace(begin, end, min(max(FEWEST_KNOTS, count), MOST_KNOTS))
 
 
 class QuinticLeg(NamedTuple):

@@ -175,19 +175,3 @@ def turn_remarks(robot: Robot, pieces: Iterable[Piece]) -> list[str]:
         for name, angle, slides in zip(robot.joint_names, far, robot.is_prismatic, strict=False)
         if angle > MANY_TURNS and not slides
     ]
-
-
-def effort_remarks(robot: Robot, force: Array) -> list[str]:
-    """Return a remark on each joint whose ``force`` (K, n), N m or N, is above its limit."""
-    largest = np.abs(force).max(axis=0, initial=0.0)
-    return [
-        f"{name} needs {most:.3g} {unit} and more, its limit is {limits.effort:.3g} {unit}"
-        for name, most, limits, unit in zip(
-            robot.joint_names,
-            largest.tolist(),
-            robot.limits,
-            np.where(robot.is_prismatic[: robot.n], "N", "N m").tolist(),
-            strict=True,
-        )
-        if most > limits.effort * (1.0 + ROUNDING)
-    ]

@@ -197,11 +197,11 @@ class Mission:
         Raises:
             InputError: it does not; names key and time.
         """
-        from .pointing import PointingCourse  # slow to import, and most missions need none
-
-        if isinstance(self._goes_on, PointingCourse) and end > self.duration:
+        # by name: what points is slow to import, and most missions do not
+        check = getattr(self._goes_on, "check", None)
+        if check and end > self.duration:
             try:
-                self._goes_on.check(self.duration, end)
+                check(self.duration, end)
             except InputError as error:
                 raise InputError(f"after the mission's end: {error}") from None
 

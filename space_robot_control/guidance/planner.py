@@ -85,8 +85,9 @@ class Planner:
             try:
                 piece, course = self._piece(segment, start)
                 check_piece(self._robot, piece)
-                if piece.mode is not None:
-                    _check_pointing(course, piece)
+                # by name: what points is slow to import, and most missions do not
+                if piece.mode and (check := getattr(course, "check", None)):
+                    check(piece.begin, piece.end)
                 if piece.end - begin > LONGEST_S:
                     raise InputError(f"all together last more than {LONGEST_S:g} s (11 days)")
             except InputError as error:
@@ -148,13 +149,6 @@ def _ended(segment: Segment, begin: float, span: float, joints: Course, base: Co
     end = np.array([begin + span])
     goal, attitude = joints.at(end)[0, 0], base.at(end)[0, :4]
     return Piece(begin, begin + span, joints, base, goal, attitude, segment.motion)
-
-
-def _check_pointing(course: Course | None, piece: Piece) -> None:
-    from .pointing import PointingCourse  # slow to import
-
-    if isinstance(course, PointingCourse):
-        course.check(piece.begin, piece.end)
 
 
 def _check_turning(segment: Segment, base: BaseMotion) -> None:

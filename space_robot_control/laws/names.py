@@ -39,35 +39,39 @@ _NAMES: dict[str, str] = {}
 """Path of each module imported here, by the module's name."""
 
 
+def _modules() -> tuple[str, ...]:
+    room = importlib.import_module(__package__)
+    return tuple(module.name for module in pkgutil.iter_modules(room.__path__))
+
+
+def _laws_in(module: str) -> dict[str, type[ControlLaw]]:
+    values = vars(importlib.import_module(f"{__package__}.{module}")).values()
+    return {value.name: value for value in values if _is_law(value)}
+
+
 @cache
 def laws() -> dict[str, type[ControlLaw]]:
     """Return every law of this folder by name."""
-    laws: dict[str, type[ControlLaw]] = {}
-    room = importlib.import_module(__package__)
-    for module in pkgutil.iter_modules(room.__path__):
-        for value in vars(importlib.import_module(f"{__package__}.{module.name}")).values():
-            if _is_law(value):
-                laws[value.name] = value
-    return laws
+    return {name: law for module in _modules() for name, law in _laws_in(module).items()}
 
 
 @explained_by("own-law")
 def find_law(name: str) -> type[ControlLaw]:
     """Return the law class by name, by ``path/file.py:Class``, or by ``module:Class``."""
-    if name in laws():
-        return laws()[name]
+    own = _laws_in(name) if name in _modules() else {}
+    if shipped := own.get(name) or laws().get(name):
+        return shipped
     if name.endswith(ENDING):
         raise InputError(f"controller {short(name)}: name the class as well, {name}:CLASS")
     advice = choices(name, sorted(laws()), ", or file.py:Class or module:Class of your own")
     if ":" not in name:
         raise InputError(f"unknown controller {short(name)}: {advice}")
-    law = import_named(
+    law: type[ControlLaw] = import_named(
         name, f"controller {short(name)}", "class", _is_law, advice, " derived from ControlLaw"
     )
     if not _is_law(law):
         raise InputError(f"controller {short(name)} is not a ControlLaw: {advice}")
-    law_class: type[ControlLaw] = law
-    return law_class
+    return law
 
 
 def _is_law(value: object) -> bool:

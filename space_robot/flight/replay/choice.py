@@ -11,7 +11,7 @@ import yaml
 
 from space_robot_control.allocation.settings import assumed_actuators
 from space_robot_control.controller.controller import Controller
-from space_robot_control.controller.gains import build_law, build_laws, check_gains, split_gains
+from space_robot_control.controller.gains import Laws, build_law, check_gains, split_gains
 from space_robot_control.controller.law_choice import LawChoice, NoLaw, parse_swaps
 from space_robot_control.controller.settings import (
     DEFAULT,
@@ -118,15 +118,15 @@ class ControllerChoice:
         self.follows_flight = is_same_law and "swaps" not in chosen
         """True if laws and gains change as they did in flight."""
 
-    def build_supervisor(self) -> tuple[Supervisor, LawChoice, dict[str, ControlLaw]]:
+    def build_supervisor(self) -> tuple[Supervisor, LawChoice, Mapping[str, ControlLaw]]:
         """Build a supervisor without memory, the choice of its laws, and these by name."""
         settings = self.settings
-        laws = build_laws(settings, self._axes, self._gains)
+        laws = Laws(settings, self._axes, self._gains)
         swaps = parse_swaps(settings.swaps, settings.period)
         first = next(iter(laws.values()))
         controller = Controller.from_settings(self.robot, first, settings, self._hardware)
         choice = LawChoice(first, [(tick, laws[name]) for tick, name in swaps])
-        return supervisor_of(controller, list(laws.values()), settings), choice, laws
+        return supervisor_of(controller, laws.values(), settings), choice, laws
 
     def set_gains(self, law: ControlLaw, flown: LawInForce) -> None:
         """Give a law the gains of the flight; those that the user gave stay."""
@@ -200,7 +200,7 @@ class ControllerChoice:
                 f"the bag does not say which robot was flown, with {max(flown_axes) - 3} joints: "
                 "name it with --set controller.robot=NAME"
             )
-        laws = build_laws(settings, axes, self._gains)
+        laws = Laws(settings, axes, self._gains)
         for swap in parse_swaps(settings.swaps, settings.period):
             one_of(swap.name, laws, "controller", " of swaps")
         self._hardware = assumed_actuators(settings.actuators, self.robot)

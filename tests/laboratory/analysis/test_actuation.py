@@ -134,7 +134,7 @@ def test_wheels_that_reverse_and_efforts_near_a_limit_are_warnings() -> None:
     metrics = report["metrics"]
     changes = [len(np.flatnonzero(np.diff(wheel[wheel != 0.0] > 0.0))) for wheel in speeds.T]
     assert [metrics[f"wheel_{k}.reversals"] for k in range(1, 5)] == changes
-    assert report["warnings"] == warnings(metrics)
+    assert report["warnings"] == analyze(log, in_brief=True)["warnings"] == warnings(metrics)
     said = warnings({"wheel_1.reversals": 1.0, "wheel_2.reversals": 0.9, "a.effort_used": 0.95})
     assert said == [
         "wheels that change their sense of rotation, times a second: wheel_1 1",
@@ -198,8 +198,9 @@ def test_wheels_at_their_limits_are_counted_and_said(paper_robot: Robot) -> None
         "wheel_3.first_limit": 0.025,
     }
     said = "at a limit of torque or momentum at 32 ticks (32.00%), wheel_1 first at 0.005 s"
-    assert any(said in text for text in remarks(report))
-    asked = sizing_table(report)
+    brief = analyze(log, in_brief=True)
+    assert any(said in text for text in remarks(brief))
+    asked = sizing_table(brief)
     assert asked is not None
     assert "what the law then asked for is not what the mission asks" in asked.notes[0]
     assert "torque_limits.base" not in report["metrics"]  # that of its hardware

@@ -30,7 +30,7 @@ from space_robot.scenario.faults import KINDS
 from space_robot.scenario.node_settings import NODES, SCHEMAS
 from space_robot_control.allocation.settings import assumed_actuators
 from space_robot_control.controller.controller import Controller
-from space_robot_control.controller.gains import build_laws, split_gains
+from space_robot_control.controller.gains import Laws, split_gains
 from space_robot_control.controller.law_choice import parse_swaps
 from space_robot_control.controller.settings import ControllerNodeSettings
 from space_robot_control.guidance.mission import Mission, MissionNodeSettings
@@ -94,7 +94,7 @@ def test_all_that_is_made_of_a_plan_agrees(plan: Planned) -> None:
     assert said["friction"] is bool(plant.friction.coulomb or plant.friction.viscous)
     # as the nodes build them
     robot = find_robot(controller.robot)
-    built = build_laws(controller, len(robot.nominal.axis_names), gains)
+    built = Laws(controller, len(robot.nominal.axis_names), gains)
     law = next(iter(built.values()))
     assert said["controller"] == law.name
     assert said["gains_used"] == {name: row.tolist() for name, row in law.given_gains.items()}
