@@ -39,6 +39,11 @@ def search_options(evaluations: int, runs: int) -> Decorator:
             show_default=True,
             help="Draws that every law flies with its best gains.",
         ),
+        click.option(
+            "--workers",
+            type=click.IntRange(0, 1024),
+            help="Processes that fly; 0: this one alone [default: one a core].",
+        ),
     )
     return lambda command: reduce(lambda inner, option: option(inner), reversed(options), command)
 
@@ -75,7 +80,6 @@ def search_options(evaluations: int, runs: int) -> Decorator:
     show_default=True,
     help="Share by which each mass and inertia may be wrong.",
 )
-@click.option("--workers", type=click.IntRange(1), help="Processes [default: as many as cores].")
 @folder_option("--out", help="Folder to write [default: ROBOT/choice, choices/ROBOT if shipped].")
 @click.pass_context
 def choose(
@@ -123,7 +127,7 @@ def choose(
         evaluations=options.pop("evaluations"),
         runs=options.pop("runs"),
         seed=options.pop("seed"),
-        workers=workers or cores(),
+        workers=cores() if workers is None else workers,
         uncertainty=Uncertainty(mass=mass_uncertainty),
     )
     scenario = {"robot": robot_as_path(robot)} | {

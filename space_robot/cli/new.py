@@ -177,6 +177,7 @@ def new_robot(
     laws: tuple[str, ...],
     evaluations: int,
     runs: int,
+    workers: int | None,
     as_json: bool,
 ) -> None:
     """Make a folder for a robot: model, mission, the law that flies it best, and its gains.
@@ -228,7 +229,11 @@ def new_robot(
     check_replaceable(folder, force, texts)
     compile_lanes()
     options = replace(
-        SHORT, laws=laws or SHORT.laws, evaluations=evaluations, runs=runs, workers=cores()
+        SHORT,
+        laws=laws or SHORT.laws,
+        evaluations=evaluations,
+        runs=runs,
+        workers=cores() if workers is None else workers,
     )
     made = make_robot(texts, read, folder, command, counting_progress, options)
     said = f"made {folder}/: `space-robot fly --robot {folder}/` flies it"

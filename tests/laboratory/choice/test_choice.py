@@ -23,7 +23,7 @@ from space_robot_control.laws import find_law, laws
 from space_robot_msgs_py.errors import InputError
 
 FRICTION = np.array([[0.15, 0.8]] * 6)
-SHORT = ("--evaluations", "10", "--runs", "2", "--duration", "1.1", "--workers", "1")
+SHORT = ("--evaluations", "10", "--runs", "2", "--duration", "1.1", "--workers", "0")
 
 
 def choose(*words: str) -> Result:
