@@ -9,14 +9,13 @@ from numpy.typing import ArrayLike, NDArray
 from random_samples import random_sample
 from strategies import random_quaternion
 
-from space_robot_control.allocation.wheel_set import WheelSet, tabulate
 from space_robot_model.hardware.base_actuators import BaseActuatorSettings
 from space_robot_model.hardware.sensors import SensorSettings
 from space_robot_model.robot import Robot
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.compiled.kernels import kernel
 from space_robot_msgs_py.compiled.records import Block
-from space_robot_msgs_py.samples import MOST_WHEELS, RobotNames, RobotState, Timebase
+from space_robot_msgs_py.samples import RobotNames, RobotState, Timebase
 from space_robot_sim.actuators.actuators import (
     Actuators,
     ActuatorSettings,
@@ -182,22 +181,3 @@ def still_log(
     if actuators.base_actuation != "ideal":
         log.flight["base_actuators"] = actuators.model_dump()
     return log
-
-
-PYRAMID = np.array([[1, 0, 0.7], [0, 1, 0.7], [-1, 0, 0.7], [0, -1, 0.7]])
-
-
-def wheel_set(axes: Array, loads: Array | None = None, out: tuple[int, ...] = ()) -> WheelSet:
-    """Tables of wheels with some axes (of any length) and full loads, but for those ``out``."""
-    wheels, axis, count = WheelSet.allocate(1), np.zeros((MOST_WHEELS, 3)), len(axes)
-    axis[:count] = axes / np.linalg.norm(axes, axis=1, keepdims=True)
-    wheels.full_load[:] = 1.0
-    wheels.full_load[:count] = 1.0 if loads is None else loads
-    wheels.takes_part[:count] = 1.0
-    wheels.takes_part[list(out)] = 0.0
-    tabulate(wheels, axis, count)
-    return wheels
-
-
-def unit(axes: Array) -> Array:
-    return np.asarray(axes / np.linalg.norm(axes, axis=1, keepdims=True))

@@ -32,7 +32,7 @@ LONGEST = 400
 
 def printed(chain: str, folder: Path) -> list[str]:
     """Run a chain of commands in a folder and return its lines."""
-    shutil.copy(HERE / "study.yaml", folder)
+    shutil.copytree(HERE / "files", folder, dirs_exist_ok=True)
     lines: list[str] = []
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(folder)

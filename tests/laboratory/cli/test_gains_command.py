@@ -35,25 +35,6 @@ def report(*arguments: str) -> dict[str, Any]:
     return found
 
 
-def test_table_iv_has_little_margin_which_is_a_remark() -> None:
-    result = run("check", "--json")
-    assert result.exit_code == 0
-    assert result.stderr == (
-        "remark: tde_smc, tde_stc, tde_tsmc: h_bar leaves a margin below 2% in torque scale\n"
-    )
-    found = json.loads(result.stdout)
-    assert found["is_sound"] is False
-    assert found["is_stable"] is True
-    assert list(found["laws"]) == sorted(laws())
-    stc = found["laws"]["tde_stc"]
-    assert stc["torque_scale_margin"] == pytest.approx(0.0031, abs=5e-5)
-    assert stc["spectral_radius"] == pytest.approx(0.997, abs=5e-4)
-    assert stc["spectral_norm"] == pytest.approx(1.029, abs=5e-4)
-    # h_bar sigma / delta, and J0 = E / 2 on either side of the base
-    assert stc["noise_gain"][3:6] == pytest.approx([5.0 / 5e-4 + 5.0] * 3)
-    assert stc["noise_gain"][:3] == pytest.approx([0.25 * (50.0 / 5e-4 + 50.0)] * 3)
-
-
 def test_an_estimate_that_diverges_is_a_failure() -> None:
     result = run("check", "--controller", "tde_stc", "--set", "controller.tde_stc.h_bar=[1e4]")
     assert isinstance(result.exception, SpaceRobotError)

@@ -23,7 +23,7 @@ from space_robot.analysis.words import of_statistic
 from space_robot.flight.simulate import simulate
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.bag.flight_log import FlightLog
-from space_robot_msgs_py.errors import FlightError, InputError
+from space_robot_msgs_py.errors import FlightError
 from space_robot_sim.environment.friction import FrictionSettings
 from space_robot_sim.faults.messages import MESSAGE_KINDS
 
@@ -210,12 +210,6 @@ def test_lost_states_have_no_command_and_are_filled() -> None:
     assert log.commanded_torque is not None
     assert np.flatnonzero(np.isnan(log.commanded_torque[:, 0])).tolist() == list(range(40, 60))
     assert (log.filled, log.unanswered, log.damage) == (20, 20, ())
-
-
-@pytest.mark.parametrize("fault", ["kill_controller@0.05", "stop_mission@0.05:1"])
-def test_processes_fail_in_a_graph_only(fault: str) -> None:
-    with pytest.raises(InputError, match=rf"^faults \['{fault}'\]: that needs the graph of nodes"):
-        flown(NOTHING, fault)
 
 
 ARGUMENTS = {"P": ["0.02", "0.3", "1"], "TICKS": ["0", "1", "4"]}

@@ -224,9 +224,6 @@ def test_one_commanded_torque_is_not_finite(kind: str, test: Any) -> None:
     assert seen == set(range(N + 3))
 
 
-JOINT_NAMES = "joint_1, .*, 1 to 6"
-
-
 @pytest.mark.parametrize(
     ("about", "name", "axes"),
     [
@@ -242,33 +239,6 @@ JOINT_NAMES = "joint_1, .*, 1 to 6"
 )
 def test_names_numbers_and_groups(about: About, name: str, axes: tuple[int, ...]) -> None:
     assert axes_of(name, about, PAPER) == axes
-
-
-@pytest.mark.parametrize(
-    ("about", "names", "said"),
-    [
-        (
-            About.AXIS,
-            ("", "0", "7", "03", "-1", "base_w", "Joint_1"),
-            f"no axis '{{}}': choose one of base_x, base_y, base_z, {JOINT_NAMES}, base, joints, a",
-        ),
-        (
-            About.BASE_AXIS,
-            ("1", "all"),
-            "no base axis '{}': choose one of base_x, base_y, base_z, b",
-        ),
-        (About.JOINT, ("base", "base_x", "all"), f"no joint '{{}}': choose one of {JOINT_NAMES}"),
-        (About.WHEEL, ("3", "thruster_1", "all"), "no wheel '{}': choose one of wheel_1, wheel_2"),
-    ],
-)
-def test_an_axis_that_is_not_there_is_named_with_those_that_are(
-    about: About, names: tuple[str, ...], said: str
-) -> None:
-    for name in names:
-        with pytest.raises(InputError, match="^" + said.format(name)):
-            axes_of(name, about, PAPER)
-    with pytest.raises(InputError, match=r"^no thruster '1': there is none$"):
-        axes_of("1", About.THRUSTER, RobotNames(PAPER.joints))
 
 
 TICKS = 200
