@@ -9,10 +9,6 @@ import pytest
 from allocation_bench import INERTIA, PERIOD, AllocationBench, couples
 from numpy.typing import NDArray
 
-from space_robot_control.allocation.allocation import Allocation
-from space_robot_control.allocation.settings import AllocationSettings
-from space_robot_model.hardware.base_actuators import BaseActuatorSettings
-
 Array = NDArray[np.float64]
 
 
@@ -166,8 +162,3 @@ def test_wheels_hold_against_pulses_when_these_come() -> None:
         given = -bench.command[:4] @ bench.axes + np.array(comes) @ bench.torques
         np.testing.assert_allclose(given, [0.05, -0.02, 0.03], atol=1e-12)
     assert np.any(opened)
-
-
-def test_ideal_base_has_no_allocation() -> None:
-    allocation = Allocation.build(1, BaseActuatorSettings(), AllocationSettings(), PERIOD)
-    assert allocation.is_used == 0.0

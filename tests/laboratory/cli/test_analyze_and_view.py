@@ -21,7 +21,6 @@ from scene_pages import Scene, plot_data
 from space_robot.analysis import analyze as report_of
 from space_robot.analysis import excerpt
 from space_robot.analysis.described import robot_of
-from space_robot.analysis.errors import tracking_error
 from space_robot.cli.main import main
 from space_robot.flight.plan import Flight, Scenario, resolve
 from space_robot.flight.simulate import simulate
@@ -68,21 +67,6 @@ def test_a_page_is_small_and_needs_no_other_file(page_file: Path) -> None:
     assert not re.search(
         r"https?:(?!//(?:www\.w3\.org|github\.com/leeoniya))|import\(|fetch\(|url\(", own
     )
-
-
-def test_the_plots_are_the_bags_errors(page_file: Path, bags: tuple[Path, Path]) -> None:
-    plots = plot_data(page_file.read_text("utf-8"))["plots"]
-    log = read_flight(bags[0])
-    by_title = {plot["title"]: plot for plot in plots}
-    assert list(by_title)[:3] == ["attitude error", "joints 1-3 error", "joints 4-6 error"]
-    error = tracking_error(log)
-    for axis, series in enumerate(by_title["joints 4-6 error"]["series"]):
-        assert series["label"] == f"joint{axis + 4}"
-        known = [value for value in series["values"] if value is not None]
-        assert max(known) == pytest.approx(np.max(error[:, axis + 6]), rel=1e-3)
-        assert min(known) == pytest.approx(np.min(error[:, axis + 6]), rel=1e-3)
-    torque = by_title["base torque"]["series"][2]["values"]
-    assert max(torque) == pytest.approx(np.max(log.applied_torque[:, 2]), rel=1e-3)
 
 
 def test_several_are_drawn_over_one_another_with_a_legend(

@@ -206,25 +206,3 @@ def test_half_a_turn_is_an_attitude_like_any_other(law: str) -> None:
     np.testing.assert_allclose(attitude_drift(log), attitude_drift(upright), rtol=0, atol=1e-9)
     with pytest.raises(SingularAttitudeError):
         simulated(controller=law, duration=0.01, parameters=turned)
-
-
-@pytest.mark.parametrize("law", sorted(laws()))
-def test_the_base_gets_no_torque_and_the_laws_no_error(law: str) -> None:
-    """Sensors, faults and a filter between plant and law make no difference to that."""
-    log = simulated(
-        controller=law,
-        actuators="none",
-        gains="robust",
-        sensors="fine",
-        navigation="filtered",
-        duration=0.1,
-        faults=["torque_scale@0.05:base=1.1"],
-        swaps=["0.08:ctc_smc"],
-    )
-    for values in (log.commanded_torque, log.applied_torque, log.telemetry.swapaxes(0, 1)[:4]):
-        assert (values[..., :3] == 0.0).all()
-    assert np.isfinite(log.telemetry).all()
-    seen = {name for name in analyze(log)["metrics"] if name.startswith("navigation")}
-    assert seen == {
-        f"navigation_joints_{group}.{kind}" for group in ("1_3", "4_6") for kind in ("rms", "max")
-    }
