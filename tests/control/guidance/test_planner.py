@@ -248,21 +248,6 @@ def test_a_mission_is_refused_in_one_line(row: dict[str, Any]) -> None:
         assert "segment" in str(caught.value) or not segments or "base" in str(caught.value)
 
 
-@pytest.mark.parametrize(
-    ("content", "said"),
-    [
-        ("", "the file is empty"),
-        ("time,joint1\n0.0\n", "line 2: 2 cells expected, got 1"),
-        ("time,joint1\n0.0,abc\n", "line 2: joint1: a number was expected, got 'abc'"),
-        ("time,joint1\n0.0,nan\n", "line 2: joint1: a number was expected, got 'nan'"),
-    ],
-)
-def test_bad_files_are_named_with_line_and_column(tmp_path: Path, content: str, said: str) -> None:
-    (tmp_path / "path.csv").write_text(content)
-    with pytest.raises(InputError, match=rf"path.csv: {said}"):
-        with_columns("{file: path.csv}", tmp_path)
-
-
 @pytest.mark.parametrize("base", [{}, {"base": "free"}], ids=["held", "free"])
 def test_a_closed_path_returns_the_joints_with_the_attitude_held_alone(base: Any) -> None:
     sides = ([0.2, 0.0, 0.0], [0.0, 0.2, 0.0], [-0.2, 0.0, 0.0], [0.0, -0.2, 0.0])

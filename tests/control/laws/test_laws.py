@@ -27,7 +27,7 @@ from space_robot_control.laws import (
     laws,
     per_axis,
 )
-from space_robot_control.laws.base import CONSTANT_INERTIA, NO_ESTIMATE, NOMINAL_INERTIA
+from space_robot_control.laws.base import CONSTANT_INERTIA, NOMINAL_INERTIA
 from space_robot_control.laws.ctc_smc import saturation
 from space_robot_model.robot.find import find_robot
 from space_robot_msgs_py.compiled.records import assign
@@ -93,29 +93,6 @@ def test_the_memory_is_a_laws_own_is_emptied_and_restored(name: str) -> None:
     assert block.tobytes() == before
 
 
-def test_model_and_time_delay_estimate_go_to_the_laws_that_say_so() -> None:
-    """By the inertia of the estimate, and whether the law itself reads the model."""
-    uses = {}
-    for name, law in laws().items():
-        built = law(random_gains(law, 9, seed=1), PERIOD)
-        uses[name] = built.estimate, law.uses_model, built.needs_model
-    none, model = (NO_ESTIMATE, False, False), (NO_ESTIMATE, True, True)
-    constant, nominal = (CONSTANT_INERTIA, False, False), (NOMINAL_INERTIA, False, True)
-    assert uses == {
-        "ctc": model,
-        "ctc_smc": model,
-        "tde_smc": constant,
-        "tde_tsmc": constant,
-        "tde_stc": constant,
-        "pd": none,
-        "pd_feedforward": model,
-        "indi": nominal,
-        "dob": none,
-        "adrc": none,
-        "slotine_li": none,
-    }
-
-
 @pytest.mark.parametrize("name", [name for name in EQUATIONS if name.startswith("tde")])
 def test_with_h_bar_zero_the_estimate_has_the_nominal_inertia(name: str) -> None:
     """The law is told so by its gain, also when it is changed; its own force has no h_bar u."""
@@ -162,19 +139,6 @@ def test_numba_finds_one_type_for_all_laws_and_keeps_it() -> None:
     assert [id(kind) for kind in first] == [id(kind) for kind in again]
     parts = [numba.typeof(part) for part in codes[0]]
     assert list(first[0].types) == parts
-
-
-def test_terminal_surface_starts_at_zero_whatever_the_error() -> None:
-    """(60) with s(0) = 0, also after a reset: the first force is that of u_PD alone."""
-    law, history = find_law("tde_tsmc"), History(9, 6)
-    gains = random_gains(law, 9, seed=5)
-    controller = law(gains, PERIOD)
-    for k in (0, 7):
-        controller.reset()
-        force = controller.force(history.at(k))
-        np.testing.assert_array_equal(controller.memory.s, np.zeros(9))
-        u_pd = history.rhodd_d[k] + gains["k_d"] * history.edot[k] + gains["k_p"] * history.e[k]
-        np.testing.assert_allclose(force, gains["h_bar"] * u_pd + history.n_hat[k], rtol=1e-13)
 
 
 def test_gains_against_friction_are_zero_and_not_told_of_unless_they_are_given() -> None:

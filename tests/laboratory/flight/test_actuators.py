@@ -163,24 +163,3 @@ def test_torquers_unload_the_wheels_and_the_law_notices_nothing() -> None:
     assert largest > 1e-6
     assert np.abs(one - other).max() < 1e-3 * largest
     assert rms(one - other) < 1e-4 * rms(other)
-
-
-@pytest.mark.parametrize("sensors", ["ideal", "fine"])
-def test_the_base_gets_what_the_law_demands(sensors: str) -> None:
-    """From torquers and wheels together, tick by tick, as it is commanded and applied."""
-    options = {"actuators": "wheels_and_torquers", "orbit": "sso_700", "sensors": sensors}
-    flight, log = fly(duration=0.2, **options)
-    assert flight.plant.names.torquers == ("torquer_1", "torquer_2", "torquer_3")
-    assert log.flight["base_actuators"]["magnetic_torquers"]["max_dipole"] == [400.0]
-    motors, dipoles = log.actuator_commands[:, :4], log.actuator_commands[:, 4:]
-    assert np.abs(dipoles).max() > 1.0
-    of_torquers = np.cross(dipoles, log.magnetic_field)
-    if sensors == "ideal":
-        b = log.magnetic_field / np.linalg.norm(log.magnetic_field, axis=1, keepdims=True)
-        across = stored(log) - np.sum(stored(log) * b, axis=1, keepdims=True) * b
-        gain = flight.controller_settings.allocation.magnetic_gain
-        np.testing.assert_allclose(of_torquers, -gain * across, rtol=0.0, atol=1e-12)
-    demand = log.commanded_torque[:, :3]
-    np.testing.assert_allclose(of_torquers - motors @ AXES, demand, rtol=0.0, atol=1e-13)
-    np.testing.assert_allclose(log.applied_torque[1:, :3], demand[:-1], rtol=0.0, atol=1e-13)
-    np.testing.assert_array_equal(log.applied_torque[1:, 3:], log.commanded_torque[:-1, 3:])

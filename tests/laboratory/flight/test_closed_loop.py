@@ -170,21 +170,6 @@ def test_feedforward_with_a_perfect_model_holds_the_base() -> None:
     assert errors[0] / errors[1] == pytest.approx(2.0, rel=0.01)
 
 
-def test_swaps_are_flown_at_their_ticks() -> None:
-    """Up to the tick before it is the flight without a swap; a swap to the same law is none, nor is
-    one after the end."""
-    plain, swapped, same = (
-        simulated(duration=0.3, swaps=swaps)
-        for swaps in ([], ["0.2:ctc", "0.1:tde_smc"], ["0.1:tde_stc", "0.3:ctc"])
-    )
-    np.testing.assert_array_equal(same.commanded_torque, plain.commanded_torque)
-    differs = (swapped.commanded_torque != plain.commanded_torque).any(axis=1)
-    assert int(np.argmax(differs)) == 200
-    assert swapped.telemetry is not None
-    has_estimate = swapped.telemetry[:, 2].any(axis=1)
-    np.testing.assert_array_equal(has_estimate[2:], np.arange(2, 600) < 400)  # ctc has none
-
-
 # Flights in one process whose messages fail
 
 NOTHING = "drop_state@0:0"

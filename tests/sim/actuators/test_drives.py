@@ -9,15 +9,10 @@ from benches import ActuatorBench as Bench
 from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
-from pydantic import ValidationError
 from scipy.linalg import expm
 from strategies import SEEDS
 
-from space_robot_model.robot import Robot
-from space_robot_msgs_py.errors import InputError
 from space_robot_sim.actuators.drive import Drive
-from space_robot_sim.plant.plant import Plant
-from space_robot_sim.plant.settings import PlantSettings
 
 Array = NDArray[np.float64]
 
@@ -114,17 +109,6 @@ def test_numbers_changed_in_flight_count_once_judged() -> None:
     drives.block[0].drive.dead_band[4] = 1e9
     Drive.refresh(drives.block[0].drive)
     assert np.flatnonzero(drives.act(np.ones(N + 3))[1] == 0.0).tolist() == [4]
-
-
-@pytest.mark.parametrize("name", ["scale", "bias", "lag", "step", "dead_band"])
-def test_lists_have_one_value_or_one_an_axis(paper_robot: Robot, name: str) -> None:
-    start = {"initial_joints_deg": [0.0] * N}
-    settings = PlantSettings.model_validate({**start, f"drive_{name}": [0.1, 0.2]})
-    wrong = f"^drive_{name} has 2 values, one for all or 9 are allowed: base x, y, z and 6 joints$"
-    with pytest.raises(InputError, match=wrong):
-        Plant(paper_robot, settings, PERIOD)
-    with pytest.raises(ValidationError):
-        PlantSettings.model_validate({**start, f"drive_{name}": []})
 
 
 TORQUES = 10.0 * np.random.default_rng(8).normal(size=(50, N + 3))

@@ -87,13 +87,6 @@ def test_a_time_without_a_tick_is_refused() -> None:
     )
 
 
-def test_what_it_is_about_is_named_or_refused_with_the_faults_text() -> None:
-    assert placed("stuck_joint@1:elbow=2").axes == (4,)
-    assert placed("drop_state@1").axes == ()
-    with pytest.raises(InputError, match=r"^fault 'stuck_joint@1:knee=2': .*elbow"):
-        placed("stuck_joint@1:knee=2")
-
-
 @pytest.mark.parametrize("share", [0.0, 0.1, 1.0])
 def test_a_probability_is_the_share_of_ticks_and_choices_are_even(share: float) -> None:
     fault = placed(f"drop_state@0.05:{share}")

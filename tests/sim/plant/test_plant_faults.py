@@ -12,7 +12,6 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from space_robot_model.robot import Robot
-from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.samples import STATE_FIELDS, Command, RobotNames, RobotState, Timebase
 from space_robot_msgs_py.wire.codecs import StateCodec
 from space_robot_sim.faults.messages import MessageFaults
@@ -86,14 +85,6 @@ def test_measurements_carry_the_wrong_stamp_and_the_truth_its_own(paper_robot: R
     assert not all(np.isfinite(getattr(measured, name)).all() for name in STATE_FIELDS)
 
 
-def test_faults_must_fit_the_plant(paper_robot: Robot) -> None:
-    for joint in ("7", "base_x", "elbow", "all"):
-        allowed = "choose one of joint1, .*, joint6, 1 to 6, joints"
-        wrong = f"^fault 'stuck_joint@1:{joint}=2': no joint '{joint}': {allowed}$"
-        with pytest.raises(InputError, match=wrong):
-            plant_of(paper_robot, f"stuck_joint@1:{joint}=2")
-
-
 def test_a_plant_changes_when_its_parts_begin_or_cease_to_fail(paper_robot: Robot) -> None:
     """Compiled code may fly on over all ticks between; messages are not the plant's affair."""
     texts = ("stuck_joint@0.01-0.02:1=9", "saturate_base@0.02:1", "drop_state@0.005")
@@ -102,19 +93,6 @@ def test_a_plant_changes_when_its_parts_begin_or_cease_to_fail(paper_robot: Robo
         changes.add(plant.next_change)
         plant.step(Command(tick, 0.0 * TORQUE))
     assert changes == {20, 40, math.inf}
-
-
-def test_settings_take_faults_and_refuse_bad_ones() -> None:
-    assert PlantNodeSettings.resolve({}).parsed_faults == []
-    settings = PlantNodeSettings.resolve({"faults": ["", "drop_state@2:0.1"], "fault_seed": 7})
-    assert [str(fault) for fault in settings.parsed_faults] == ["drop_state@2:0.1"]
-    assert settings.fault_seed == 7
-    with pytest.raises(InputError, match="plant parameters: faults: fault 'drop@2': unknown kind"):
-        PlantNodeSettings.resolve({"faults": ["drop@2"]})
-    with pytest.raises(InputError, match="fault 'kill_mission@2': unknown kind"):
-        PlantNodeSettings.resolve({"faults": ["kill_mission@2"]})
-    with pytest.raises(InputError, match=r"fault_seed: .* greater than or equal to 0"):
-        PlantNodeSettings.resolve({"fault_seed": -1})
 
 
 class Watched:
@@ -297,10 +275,3 @@ def test_what_is_sent_awaited_and_acts(
     acting: list[int],
 ) -> None:
     assert Way(paper_robot, text).fly(5) == (sent, awaited or sent, acting)
-
-
-def test_spoilt_states_leave_the_plant_s_own_alone(paper_robot: Robot) -> None:
-    way = Way(paper_robot, "nan_state@0", "stamp_back@0")
-    way.fly(20)
-    assert way.state.tick == 19
-    assert np.isfinite(way.state.numbers).all()
