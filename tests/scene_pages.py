@@ -196,6 +196,6 @@ def orbiting_log(robot: Robot, orbit: CircularOrbit, ticks: int, period_ns: int)
     log.flight = {
         "robot": robot.name,
         "robot_file": robot.content,
-        "parameters": {"plant": orbit.parameters},
+        "scenario": {"parameters": {"plant": orbit.parameters}},
     }
     return log

@@ -313,6 +313,6 @@ def random_log(
     log.flight = {
         "controller": "tde_stc",
         "command_latency_ticks": latency_ticks,
-        "parameters": {"plant": LIMITS},
+        "scenario": {"parameters": {"plant": LIMITS}},
     }
     return log

@@ -13,7 +13,7 @@ from orbit import stored
 from scipy.spatial.transform import Rotation
 
 from space_robot import Scenario
-from space_robot.analysis.described import base_actuators_of
+from space_robot.analysis.described import plant_settings
 from space_robot.analysis.mission_plan import plan_report, planned_segments
 from space_robot.api.flown_flight import FlownFlight
 
@@ -71,14 +71,14 @@ def planned_share(_: FlownFlight) -> float:
 
 def flown_share(flown: FlownFlight) -> float:
     """Return the largest share of its momentum that a wheel had."""
-    wheels = base_actuators_of(flown.log).wheels
+    wheels = plant_settings(flown.log).wheels
     spin = np.abs(wheels.spin_momenta(flown.log.wheel_velocities)).max(axis=0)
     return float(np.max(spin / wheels.values("max_momentum")))
 
 
 def given(flown: FlownFlight) -> float:
     """Return the largest change of the wheels' momentum, on inertial axes, N m s."""
-    wheels, rows = base_actuators_of(flown.log).wheels, slice(None, None, 200)
+    wheels, rows = plant_settings(flown.log).wheels, slice(None, None, 200)
     spin = wheels.spin_momenta(flown.log.wheel_velocities[rows]) @ wheels.unit_axes
     held = Rotation.from_quat(flown.log.quaternion[rows], scalar_first=True).apply(spin)
     return float(np.linalg.norm(held - held[0], axis=1).max())

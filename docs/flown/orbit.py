@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 from flown_tables import Number, Options, Page, Table
 
-from space_robot.analysis.described import base_actuators_of
+from space_robot.analysis.described import plant_settings
 from space_robot.api.flown_flight import FlownFlight
 
 ORBIT_S = 5560.0
@@ -47,7 +47,7 @@ def stored(share: float) -> Callable[[FlownFlight], float]:
 
     def momentum(flown: FlownFlight) -> float:
         row = round(share * (flown.log.ticks - 1))
-        wheels = base_actuators_of(flown.log).wheels
+        wheels = plant_settings(flown.log).wheels
         spin = wheels.spin_momenta(flown.log.wheel_velocities[row])
         return float(np.linalg.norm(spin @ wheels.unit_axes))
 

@@ -79,23 +79,6 @@ def pointed_axis(segments: Sequence[str], start: str = "") -> Array | None:
     return None
 
 
-def recorded_mission(log: FlightLog) -> dict[str, Any]:
-    """Return the mission that a bag describes; empty: it describes none."""
-    scenario = log.flight.get("scenario")
-    mission = scenario.get("mission") if isinstance(scenario, dict) else None
-    return mission if isinstance(mission, dict) else {}
-
-
-def _pointed_axis_of(log: FlightLog) -> Array | None:
-    if log.scenario is not None:
-        mission = log.scenario.mission
-        return pointed_axis(mission.written_segments, mission.base_point)
-    recorded = recorded_mission(log)
-    segments = recorded.get("segments")
-    texts = [str(text) for text in segments] if isinstance(segments, list) else []
-    return pointed_axis(texts, str(recorded.get("base_point") or ""))
-
-
 def window_ticks(window_s: float, period: float) -> int:
     """Return the number of ticks in a window, at least 2; ``period`` in s."""
     return max(2, round(window_s / period))
@@ -122,8 +105,11 @@ class AnalysedLog:
 
     @cached_property
     def pointed_axis(self) -> Array | None:
-        """(3,) the axis that the mission points; None: it points none."""
-        return _pointed_axis_of(self.log)
+        """(3,) the axis that the mission points; None: it points none, or is not known."""
+        with suppress(InputError):
+            mission = described.settings_of(self.log).mission
+            return pointed_axis(mission.written_segments, mission.base_point)
+        return None
 
     @cached_property
     def budget(self) -> PointingBudget:

@@ -10,19 +10,19 @@ the telemetry.
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from space_robot_control.controller.settings import ControllerNodeSettings
 from space_robot_control.navigation.rate_filters import low_pass_weight
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.bag.law_history import laws_of
 from space_robot_msgs_py.errors import InputError
 
 from .analysed_log import AnalysedLog
-from .described import DIRECT, navigation_of, parameters_of
+from .described import DIRECT, NotDescribedError, navigation_of, settings_of
 from .errors import applied_force, continuous_error, mean_acceleration, measured_rows
 from .series import Definition, TimeSeries, series
 
@@ -152,13 +152,10 @@ def smoothing_of(log: FlightLog) -> float:
         raise InputError("the filtered states that N_hat is formed of are not recorded")
     if not log.laws:
         raise InputError("the laws in force were not recorded")
-    if log.scenario is not None:
-        filter_hz = log.scenario.controller.acceleration_filter_hz
-    else:
-        key, recorded = "acceleration_filter_hz", parameters_of(log, ControllerNodeSettings.node)
-        known = {key: recorded[key]} if key in recorded else {}
-        filter_hz = ControllerNodeSettings.resolve(known).acceleration_filter_hz
-    return low_pass_weight(filter_hz, log.timebase.period)
+    with suppress(NotDescribedError):
+        filter_hz = settings_of(log).controller.acceleration_filter_hz
+        return low_pass_weight(filter_hz, log.timebase.period)
+    return 0.0
 
 
 def recorded_h_bar(log: FlightLog) -> Array:

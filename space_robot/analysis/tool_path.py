@@ -17,17 +17,16 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from space_robot_control.guidance.mission import Mission, MissionSettings
+from space_robot_control.guidance.mission import Mission
 from space_robot_model.elementary.matrices import norms, unit_rows
 from space_robot_model.robot import Robot
 from space_robot_model.robot.momentum import Motion, robot_momentum
 from space_robot_model.robot.placements import tool_pose
 from space_robot_msgs_py.bag.flight_log import FlightLog
-from space_robot_msgs_py.config.validation import validate
 from space_robot_msgs_py.errors import InputError
 
-from .analysed_log import AnalysedLog, recorded_mission
-from .described import assumed_robot_of, captures_of
+from .analysed_log import AnalysedLog
+from .described import captures_of, settings_of
 from .momentum import happens_in
 from .pointing import rotation_angle
 from .series import Definition, TimeSeries, series
@@ -52,7 +51,7 @@ class ToolPath:
         frame is at the path's origin at the first row.
         """
         self._log, self._captures = log, captures_of(log)
-        self._robot = assumed_robot_of(log).nominal
+        self._robot = settings_of(log).robots.controller.nominal
         first = log.rows(0, 1)
         true = self._captures.robot_at(first.first_tick - 1)  # the first tick's events follow
         reference = unit_rows(first.reference_base[:, :4]), first.reference_joints[:, 0]
@@ -137,14 +136,11 @@ def leads_tool(log: FlightLog) -> bool:
     """
     if log.scenario is not None:
         return bool(log.scenario.reference.leads_tool)
-    planned = recorded_mission(log)
-    if not planned or not log.ticks:
+    if not log.flight.get("mission") or not log.ticks:
         return False
     try:
-        own = {key: planned[key] for key in MissionSettings.model_fields if key in planned}
-        settings = validate(MissionSettings, own, "mission of the bag")
-        period, last = log.timebase.period, float(log.time[-1])
-        mission = Mission(assumed_robot_of(log), settings, period)
+        settings, period, last = settings_of(log), log.timebase.period, float(log.time[-1])
+        mission = Mission(settings.robots.controller, settings.mission, period)
         if mission.leads_tool:
             return True
         reference = mission.chunk(round(last / period), 1)

@@ -15,7 +15,6 @@ from space_robot_sim.environment.environment import with_payload
 from ..console.files import atomic_file, make_folder
 from ..flight.plan import Scenario
 from ..scenario.node_settings import FlightSettings
-from ..scenario.resolved import Robots
 from ..tuning.flexible import fast_inertia
 from ..tuning.gain_file import gain_files
 from ..tuning.inertia import SAMPLING, inertia_along, postures_along, sampled_reference
@@ -40,7 +39,7 @@ def tuned_set(
     """
     plans = [validate(Scenario, {**options, "case": case}, "options") for case in cases]
     settings = [FlightSettings.resolve(plan) for plan in plans]
-    nominal, reference = Robots.read(settings[0], plans[0].robot).plant, settings[0].mission
+    nominal, reference = settings[0].robots.plant, settings[0].mission
     motion = sampled_reference(nominal, reference)
     if not (motion.joints[:, 1].any() or motion.base[:, 4:].any()):
         raise InputError("the mission moves neither joints nor base: tuning needs a motion")

@@ -32,7 +32,7 @@ def diff(first: Path, second: Path, as_json: bool) -> None:
 
     from ..console.tables import Column, Table, named
     from ..console.terminal import echo_json, print_table, say
-    from ..scenario.comparison import differences
+    from ..scenario.recorded import differences
 
     changes = list(differences(_resolved(first), _resolved(second)))
     if as_json:
@@ -51,10 +51,10 @@ def _resolved(path: Path) -> dict[str, Any]:
     from space_robot_msgs_py.config.validation import read_yaml, validate
 
     from ..flight.plan import Flight, Scenario, resolve
-    from ..scenario.comparison import recorded_scenario
+    from ..scenario.recorded import bag_options
 
     if path.suffix not in (".yaml", ".yml"):
-        return recorded_scenario(path)
+        return bag_options(path)
     return Flight(resolve(validate(Scenario, read_yaml(path), str(path)))).scenario.tree
 
 

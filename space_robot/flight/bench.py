@@ -26,7 +26,7 @@ from space_robot_msgs_py.samples import Command, Reference, RobotState
 from space_robot_sim.plant.plant import Plant, PlantSnapshot
 from space_robot_sim.plant.settings import PlantSettings
 
-from ..scenario.comparison import differences
+from ..scenario.recorded import differences
 from .bench_log import BenchHistory, BenchLog, law_at
 from .ending import Ending
 from .plan import Flight

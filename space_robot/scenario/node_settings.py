@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 from inspect import isclass
 from typing import Any
 
@@ -20,6 +21,8 @@ from space_robot_control.guidance.mission import (
 from space_robot_control.laws import find_law, importable_name, laws
 from space_robot_control.navigation.settings import assumed_numbers
 from space_robot_model.orbit.ephemeris import AssumedOrbit, AssumedTarget
+from space_robot_model.robot import Robot
+from space_robot_model.robot.find import robot_source
 from space_robot_model.robot.mission_document import OF_PLANT, document_settings
 from space_robot_msgs_py.bag.recorder import RecorderNodeSettings
 from space_robot_msgs_py.config.files import GIVEN, Tree, flatten, merge, nest
@@ -65,9 +68,86 @@ SET_BY_OPTIONS = ("period", "paused")
 """Those among them that options of a flight set."""
 
 
+RobotAndFile = tuple[Robot, Tree | None]
+"""A robot, and the content of its file; None: of a robot in memory, whose own numbers count."""
+
+
+@dataclass(frozen=True)
+class Robots:
+    """The robots of plant and controller, which have the same joints."""
+
+    true: RobotAndFile
+    assumed: RobotAndFile
+
+    @classmethod
+    def read(cls, nodes: Sequence[NodeSettings], robot: Any, plant_robot: Any = None) -> Robots:
+        """Read the robots that plant, controller and mission name, or that options are.
+
+        Raises:
+            InputError: a robot does not exist, or its joints differ from the plant's.
+        """
+        sources = {} if isinstance(robot, str) else {robot_setting(robot): _source(robot)}
+        for node in nodes if plant_robot is None else nodes[1:]:
+            if node.robot not in sources:
+                sources[node.robot] = _source(node.robot)
+        plant = sources[nodes[0].robot] if plant_robot is None else _source(plant_robot)
+        true, controller = plant[0], sources[nodes[1].robot]
+        for node in nodes[1:]:
+            other = sources[node.robot][0]
+            if (other.joint_names, other.passive_names) != (true.joint_names, true.passive_names):
+                raise InputError(
+                    f"the robots of plant and {node.node} must have the same joints, got "
+                    f"{true.name!r} with {', '.join(true.all_joint_names)} and "
+                    f"{other.name!r} with {', '.join(other.all_joint_names)}"
+                )
+        return cls(plant, controller)
+
+    def with_plant(self, robot: Robot) -> Robots:
+        """Return the same robots but for the plant's, which has the same joints."""
+        return replace(self, true=(robot, None))
+
+    @property
+    def plant(self) -> Robot:
+        """The true robot."""
+        return self.true[0]
+
+    @property
+    def controller(self) -> Robot:
+        """The robot assumed by the flight software."""
+        return self.assumed[0]
+
+    @cached_property
+    def options(self) -> dict[str, Tree]:
+        """The robots' numbers as options of a flight; the plant's if it differs."""
+        plant, controller = (
+            robot.content if content is None else content
+            for robot, content in (self.true, self.assumed)
+        )
+        return {"robot": controller, **({} if controller == plant else {"plant_robot": plant})}
+
+    @property
+    def description(self) -> dict[str, Any]:
+        """Numbers of the plant's robot, and of the controller's if it differs."""
+        assumed = self.options["robot"]
+        if "plant_robot" not in self.options:
+            return {"robot_file": assumed}
+        return {
+            "robot_file": self.options["plant_robot"],
+            "controller_robot": self.controller.name,
+            "controller_robot_file": assumed,
+        }
+
+
+def _source(robot: str | Robot | Tree) -> RobotAndFile:
+    if isinstance(robot, str):
+        file = robot_source(robot)
+        return file.robot, file.content
+    return (robot, None) if isinstance(robot, Robot) else (Robot.from_dict(robot), robot)
+
+
 @dataclass(frozen=True)
 class FlightSettings:
-    """Settings of every node, and gains given directly by the user."""
+    """Settings of every node, the robots, and gains given directly by the user."""
 
     plant: PlantNodeSettings
     controller: ControllerNodeSettings
@@ -75,6 +155,8 @@ class FlightSettings:
     recorder: RecorderNodeSettings
     gains: dict[str, Tree]
     """Gains by law, which override the gain set."""
+    robots: Robots
+    """Robot of the plant, and robot assumed by the flight software."""
 
     @staticmethod
     def resolve(scenario: Scenario) -> FlightSettings:
@@ -94,14 +176,15 @@ class FlightSettings:
         mission = with_assumed_orbit(mission, plant)
         plant = _at_pointing_start(plant, mission)
         recorder = RecorderNodeSettings.resolve(chosen["recorder"])
-        settings = FlightSettings(plant, controller, mission, recorder, gains)
-        periods = {node: getattr(settings, node).period for node in NODES}
+        periods = {s.node: s.period for s in (plant, controller, mission, recorder)}
         if len(set(periods.values())) > 1:
             said = ", ".join(f"{node} {period:g}" for node, period in periods.items())
             raise InputError(
                 f"the period must be the same for all nodes, got {said} s: use --period"
             )
-        return settings
+        with explained_by("own-robot"):
+            robots = Robots.read((plant, controller, mission), scenario.robot, scenario.plant_robot)
+        return FlightSettings(plant, controller, mission, recorder, gains, robots)
 
 
 def _controller(

@@ -25,7 +25,7 @@ from .faults import FAULTED_NODES, KINDS, PROCESS_KINDS
 from .node_settings import FlightSettings, option_parameters
 from .objects import resolve_law, sampled
 from .options import OPTIONS
-from .resolved import ResolvedScenario, Robots
+from .resolved import ResolvedScenario
 from .scenario import Scenario
 
 
@@ -40,21 +40,18 @@ def resolve(scenario: Scenario) -> ResolvedScenario:
     if "controller" in scenario.without:
         scenario = scenario.model_copy(update={"controller": None})
     settings = FlightSettings.resolve(scenario)
-    with explained_by("own-robot"):
-        robots = Robots.read(settings, scenario.robot, scenario.plant_robot)
-    laws = _laws(scenario, settings, robots.plant.n + 3)
+    laws = flight_laws(scenario, settings)
     resolved = ResolvedScenario(
         **vars(settings),
         options=scenario,
         mission_name=settings.mission.mission or robot_files(settings.mission.robot).name,
-        robots=robots,
-        reference=_mission(settings, robots.controller),
+        reference=_mission(settings, settings.robots.controller),
         laws=laws,
         swaps=[
             (tick, laws[one_of(name, laws, "controller", " of swaps")])
             for tick, name in parse_swaps(settings.controller.swaps, settings.plant.period)
         ],
-        assumed_actuators=_assumed_actuators(scenario, settings, robots.controller),
+        assumed_actuators=software_actuators(scenario, settings),
         process_faults=faults,
     )
     _check_disturbance(resolved)
@@ -110,7 +107,9 @@ def _mission(settings: FlightSettings, robot: Robot) -> Mission:
             raise InputError(f"{file}: {error}") from None
 
 
-def _laws(scenario: Scenario, settings: FlightSettings, axes: int) -> Mapping[str, ControlLaw]:
+def flight_laws(scenario: Scenario, settings: FlightSettings) -> Mapping[str, ControlLaw]:
+    """Return all laws of a flight, by name: the one in force at the start comes first."""
+    axes = settings.robots.plant.n + 3
     if scenario.controller is None:
         return {NoLaw.name: NoLaw({}, settings.plant.period, axes)}
     own = resolve_law(scenario.controller)
@@ -120,10 +119,9 @@ def _laws(scenario: Scenario, settings: FlightSettings, axes: int) -> Mapping[st
         return Laws(settings.controller, axes, settings.gains, own or "")
 
 
-def _assumed_actuators(
-    scenario: Scenario, settings: FlightSettings, robot: Robot
-) -> BaseActuatorSettings:
-    name = settings.controller.actuators
+def software_actuators(scenario: Scenario, settings: FlightSettings) -> BaseActuatorSettings:
+    """Return the base's actuators as the flight software assumes them."""
+    robot, name = settings.robots.controller, settings.controller.actuators
     if isinstance(scenario.assumed_actuators, str):
         try:
             return assumed_actuators(scenario.assumed_actuators, robot)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from operator import attrgetter
 from typing import Any
@@ -17,8 +17,6 @@ from space_robot_control.guidance.mission import Mission, MissionSettings
 from space_robot_control.laws import ControlLaw
 from space_robot_model.hardware.base_actuators import BaseActuatorSettings
 from space_robot_model.hardware.sensors import SensorSettings
-from space_robot_model.robot import Robot
-from space_robot_model.robot.find import robot_source
 from space_robot_msgs_py.config.files import Tree, flatten
 from space_robot_msgs_py.errors import InputError
 from space_robot_sim.actuators.actuators import ActuatorSettings
@@ -28,12 +26,11 @@ from space_robot_sim.environment.friction import coefficients
 from space_robot_sim.environment.orbit import OrbitSettings
 from space_robot_sim.faults.grammar import Fault
 from space_robot_sim.plant.plant import Plant
-from space_robot_sim.plant.report import actuators, plant_description
+from space_robot_sim.plant.report import plant_description
 from space_robot_sim.plant.settings import MOST_TICKS, PLANT_KINDS
 
 from .faults import PROCESS_KINDS
 from .node_settings import NODES, NOT_TO_BE_SET, SET_BY_OPTIONS, FlightSettings
-from .objects import robot_setting
 from .options import OPTIONS
 from .scenario import Scenario
 
@@ -49,8 +46,6 @@ class ResolvedScenario(FlightSettings):
     """Options as the user wrote them."""
     mission_name: str
     """Name of the mission's file; the robot's name if the mission belongs to the robot."""
-    robots: Robots
-    """Robot of the plant, and robot assumed by the flight software."""
     reference: Mission
     """Desired motion of joints and base."""
     laws: Mapping[str, ControlLaw]
@@ -162,24 +157,14 @@ class ResolvedScenario(FlightSettings):
             plant: made from it.
             robot_file: numbers of the plant's robot.
         """
-        controller, numbers = self.controller, self.controller.filter_settings
-        assumed, is_other = {}, False
-        if self.plant.base_actuation != "ideal":
-            assumed = actuators(self.assumed_actuators)
-            is_other = assumed != actuators(self.plant)
         return {
             "controller": self.law.name,
             **plant_description(self.robots.plant, robot_file, plant, self.plant),
-            **({"controller_base_actuators": assumed} if is_other else {}),
-            "gains": controller.gains,
+            "gains": self.controller.gains,
             **({"own_gains": self.own_gains} if self.own_gains else {}),
             "mission": self.mission_name,
             "ticks": self.ticks,
-            **(
-                {"navigation": "filtered", "navigation_filter": numbers.model_dump()}
-                if numbers
-                else {}
-            ),
+            "navigation": self.controller.navigation,
             **({"faults": self.faults} if self.faults else {}),
             **({"swaps": self.swap_texts} if self.swap_texts else {}),
             **({"restart_controller": True} if self.options.restart_controller else {}),
@@ -194,9 +179,7 @@ class ResolvedScenario(FlightSettings):
         robots = self.robots.description
         return {
             **self.brief(plant, robots["robot_file"]),
-            "parameters": self.parameters,
             "scenario": {k: v for k, v in self.tree.items() if k not in ("robot", "plant_robot")},
-            "gains_used": self.gains_used,
             **robots,
         }
 
@@ -294,80 +277,3 @@ HELD = {
     *("fault_seed", "navigation_filter", "navigation_sensors"),
 }
 """Settings of nodes that an option holds."""
-
-
-RobotAndFile = tuple[Robot, Tree | None]
-"""A robot, and the content of its file; None: of a robot in memory, whose own numbers count."""
-
-
-@dataclass(frozen=True)
-class Robots:
-    """The robots of plant and controller, which have the same joints."""
-
-    true: RobotAndFile
-    assumed: RobotAndFile
-
-    @classmethod
-    def read(cls, settings: FlightSettings, robot: Any, plant_robot: Any = None) -> Robots:
-        """Read the robots that settings of nodes name, or that options of the flight are.
-
-        Raises:
-            InputError: a robot does not exist, or its joints differ from the plant's.
-        """
-        sources = {} if isinstance(robot, str) else {robot_setting(robot): _source(robot)}
-        for node in (settings.plant, settings.controller, settings.mission):
-            if node.robot not in sources and (node is not settings.plant or plant_robot is None):
-                sources[node.robot] = _source(node.robot)
-        plant = sources[settings.plant.robot] if plant_robot is None else _source(plant_robot)
-        true, controller = plant[0], sources[settings.controller.robot]
-        for node in (settings.controller, settings.mission):
-            other = sources[node.robot][0]
-            if (other.joint_names, other.passive_names) != (true.joint_names, true.passive_names):
-                raise InputError(
-                    f"the robots of plant and {node.node} must have the same joints, got "
-                    f"{true.name!r} with {', '.join(true.all_joint_names)} and "
-                    f"{other.name!r} with {', '.join(other.all_joint_names)}"
-                )
-        return cls(plant, controller)
-
-    def with_plant(self, robot: Robot) -> Robots:
-        """Return the same robots but for the plant's, which has the same joints."""
-        return replace(self, true=(robot, None))
-
-    @property
-    def plant(self) -> Robot:
-        """The true robot."""
-        return self.true[0]
-
-    @property
-    def controller(self) -> Robot:
-        """The robot assumed by the flight software."""
-        return self.assumed[0]
-
-    @cached_property
-    def options(self) -> dict[str, Tree]:
-        """The robots' numbers as options of a flight; the plant's if it differs."""
-        plant, controller = (
-            robot.content if content is None else content
-            for robot, content in (self.true, self.assumed)
-        )
-        return {"robot": controller, **({} if controller == plant else {"plant_robot": plant})}
-
-    @property
-    def description(self) -> dict[str, Any]:
-        """Numbers of the plant's robot, and of the controller's if it differs."""
-        assumed = self.options["robot"]
-        if "plant_robot" not in self.options:
-            return {"robot_file": assumed}
-        return {
-            "robot_file": self.options["plant_robot"],
-            "controller_robot": self.controller.name,
-            "controller_robot_file": assumed,
-        }
-
-
-def _source(robot: str | Robot | Tree) -> RobotAndFile:
-    if isinstance(robot, str):
-        file = robot_source(robot)
-        return file.robot, file.content
-    return (robot, None) if isinstance(robot, Robot) else (Robot.from_dict(robot), robot)

@@ -41,19 +41,18 @@ class _Open(BaseModel):
     model_config = ConfigDict(extra="allow", strict=True, frozen=True, allow_inf_nan=False)
 
 
-class _Names(_Open):
+class _Description(_Open):
     robot: Text = ""
     mission: Text = ""
     case: Text = ""
+    sensors: Text = ""
+    navigation: Text = ""
     actuators: Text = ""
     controller: Text = ""
     gains: Text = ""
     swaps: list[Text] = Field(default_factory=list)
     faults: list[Text] = Field(default_factory=list)
     events: list[Text] = Field(default_factory=list)
-
-
-class _Description(_Names):
     period: Annotated[float, Field(ge=1e-9, le=LONGEST_PERIOD)] = 0.0005
     ticks: Count = 0
     command_latency_ticks: Annotated[int, Field(ge=0, le=10**6)] = 0
@@ -61,12 +60,10 @@ class _Description(_Names):
     realtime: bool = False
     seed: Count = 0
     restart_controller: bool = False
-    parameters: dict[Text, _Names] = Field(default_factory=dict)
+    scenario: dict[Text, JsonValue] = Field(default_factory=dict)
     own_gains: list[Text] = Field(default_factory=list)
-    gains_used: dict[Text, list[float]] = Field(default_factory=dict)
     robot_file: dict[Text, JsonValue] = Field(default_factory=dict)
     base_actuators: dict[Text, JsonValue] = Field(default_factory=dict)
-    controller_base_actuators: dict[Text, JsonValue] = Field(default_factory=dict)
     prismatic_joints: list[Text] = Field(default_factory=list)
     controller_robot: Text = ""
     controller_robot_file: dict[Text, JsonValue] = Field(default_factory=dict)

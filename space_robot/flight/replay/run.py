@@ -6,7 +6,7 @@ import math
 import time
 from array import array
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field, fields
 from itertools import islice
@@ -31,7 +31,6 @@ from space_robot_msgs_py.wire.codecs import StateCodec
 from space_robot_msgs_py.wire.telemetry import ReferenceCodec
 
 from ...console.progress import flight_progress
-from ...processes.scratch_folder import ScratchFolder
 from ..compilation import compile_kernels
 from ..flight_messages import answers
 from .choice import ControllerChoice
@@ -292,36 +291,20 @@ def replay(bag: str | Path, **options: Any) -> Replay:
     asked = ReplayOptions(as_path(bag, "bag"), **options)
     recording = Recording(asked.bag, asked.remap, asked.namespace)
     laws = recording.laws()
-    with ScratchFolder() as folder:
-        choice = ControllerChoice(
-            recording.flight,
-            Path(folder),
-            asked.controller,
-            asked.gains,
-            asked.parameters,
-            asked.trust,
-            laws,
-        )
-        return _replay(asked, recording, choice, laws)
-
-
-def _replay(
-    options: ReplayOptions,
-    recording: Recording,
-    choice: ControllerChoice,
-    laws: Sequence[LawInForce],
-) -> Replay:
+    choice = ControllerChoice(
+        recording.flight, asked.controller, asked.gains, asked.parameters, asked.trust, laws
+    )
     period = recording.timebase.period
-    check_time(options.start_s, "start")
-    check_time(min(options.end_s, LATEST_S), "end")
-    start, stop = int(tick_from(options.start_s, period)), tick_from(options.end_s, period)
+    check_time(asked.start_s, "start")
+    check_time(min(asked.end_s, LATEST_S), "end")
+    start, stop = int(tick_from(asked.start_s, period)), tick_from(asked.end_s, period)
     recorded = recording.commands(choice.names.commanded)
     if recording.has_commands and not recording.is_finished and len(recorded.ticks):
         stop = min(stop, int(recorded.ticks[-1]) + 1)
     recorded = recorded.within(start, stop)
     states = required_parts(recording, choice), start, stop
     if next(recording.states(*states), None) is None:
-        raise InputError(f"{options.bag}: no states in the part to be replayed")
+        raise InputError(f"{asked.bag}: no states in the part to be replayed")
     laws = within(laws, start, stop)
     compile_kernels(bool(choice.names.actuators))
     controller = ReplayedController(choice, recording, start)
@@ -361,7 +344,7 @@ def _replay(
         (*choice.names.thrusters, *recording.flight.get("prismatic_joints", ())),
         choice.names.torquers,
     )
-    return Replay(options, choice, recording, comparison, laws, skipped, elapsed, error)
+    return Replay(asked, choice, recording, comparison, laws, skipped, elapsed, error)
 
 
 def required_parts(recording: Recording, choice: ControllerChoice) -> tuple[Topic, ...]:

@@ -7,6 +7,7 @@ import shutil
 import signal
 import sys
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -22,12 +23,10 @@ from space_robot.flight.replay.choice import ControllerChoice
 from space_robot.flight.simulate import simulate
 from space_robot.processes.interruption import Interrupted
 from space_robot.scenario.node_settings import option_parameters
-from space_robot_control.controller.gains import split_gains
 from space_robot_control.laws import ControlLaw, LawGains, find_law, importable_name
 from space_robot_control.laws.base import LawError, force_of
 from space_robot_control.laws.names import NotTrustedError, is_plain
 from space_robot_msgs_py.bag.reader import read_flight
-from space_robot_msgs_py.config.files import flatten
 from space_robot_msgs_py.errors import InputError
 
 
@@ -184,56 +183,66 @@ def ran(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[], bool]:
     return (tmp_path / "was_run").exists
 
 
-def described(**changes: Any) -> dict[str, Any]:
-    """A description as of an older bag, whose parameters hold no gains."""
+def described(flown: str = "tde_stc", **scenario: Any) -> dict[str, Any]:
+    """A description whose scenario has other options; of a law by the name that it has itself."""
     description = json.loads(json.dumps(Flight(resolve(Scenario())).description))
-    recorded, _ = split_gains(description["parameters"]["controller"])
-    parameters = dict(flatten(recorded)) | changes.pop("controller_node", {})
-    description["parameters"]["controller"] = parameters
-    return {**description, **changes}
+    description["scenario"] |= scenario
+    return {**description, "controller": flown}
 
 
 IMPORTS = "--trust imports a module:Class"
 READS = "read only with --trust"
-SECRET = dict.fromkeys(["gains", "robot"], "secret.yaml")
 
 
 @pytest.mark.parametrize(
-    ("changes", "lacking", "said"),
+    ("options", "said"),
     [
-        ({"controller_node": {"controller": LAW}, "controller": "stranger"}, "gains_used", IMPORTS),
-        ({"controller_node": {"swaps": [f"0.01:{LAW}"]}}, "gains_used", IMPORTS),
-        ({"parameters": {}, "controller": LAW}, "gains_used", IMPORTS),
-        ({"parameters": {"controller": {}}, "controller": LAW}, "gains_used", IMPORTS),
-        ({"controller_node": {"controller": "this:X"}}, "gains_used", IMPORTS),
-        ({"controller_node": SECRET}, "gains_used", READS),
-        ({"controller_node": SECRET}, "robot_file", READS),
-        ({"controller_node": {"actuators": "./secret.yaml"}}, "", READS),
+        ({"controller": LAW}, IMPORTS),
+        ({"controller": "this:X"}, IMPORTS),
+        ({"swaps": [f"0.01:{LAW}"]}, IMPORTS),
+        ({"gains": "./secret.yaml"}, READS),
+        ({"actuators": "./secret.yaml"}, READS),
+        ({"assumed_actuators": "./secret.yaml"}, READS),
+        ({"parameters": {"controller": {"robot": "secret.yaml"}}}, READS),
+        ({"parameters": {"controller": {"navigation_sensors": "secret.yaml"}}}, READS),
     ],
 )
 def test_a_replay_imports_no_module_and_reads_no_file_that_a_bag_names(
-    changes: dict[str, Any], lacking: str, said: str, tmp_path: Path, ran: Callable[[], bool]
+    options: dict[str, Any], said: str, tmp_path: Path, ran: Callable[[], bool]
 ) -> None:
     (tmp_path / "secret.yaml").write_text("password: 1234")
-    flight = described(**changes)
-    flight.pop(lacking, None)
+    flight = described(**options)
     with pytest.raises(NotTrustedError, match=said):
-        ControllerChoice(flight, tmp_path)
+        ControllerChoice(flight)
     assert not ran()
     assert "this" not in sys.modules
 
 
-def test_with_trust_it_does_and_the_users_own_word_needs_none(
-    tmp_path: Path, ran: Callable[[], bool]
+@pytest.mark.parametrize(
+    "options",
+    [
+        {"gains": {LAW: {"k": [1.0]}}},
+        {"parameters": {"controller": {LAW: {"k": [1.0]}, "controller": LAW}}},
+    ],
+)
+def test_gains_of_a_law_that_is_not_flown_import_nothing(
+    options: dict[str, Any], ran: Callable[[], bool]
 ) -> None:
-    flight = described(controller_node={"controller": LAW}, controller="stranger")
-    given = tmp_path / "given"
-    given.mkdir()
-    assert ControllerChoice(flight, tmp_path, trust=True).law_name == "stranger"
+    flight = described(**options)
+    with suppress(InputError):
+        assert ControllerChoice(flight).law_name == "tde_stc"
+    assert not ran()
+
+
+def test_with_trust_it_does_and_the_users_own_word_needs_none(ran: Callable[[], bool]) -> None:
+    flight = described("stranger", controller=LAW)
+    gains = flight["scenario"]["gains"]
+    gains["stranger"] = gains["tde_stc"]
+    assert ControllerChoice(flight, trust=True).law_name == "stranger"
     assert ran()
-    assert ControllerChoice(flight, given, LAW).law_name == "stranger"
-    by_set = ControllerChoice(flight, given, chosen={"controller": "tde_stc"})
-    assert by_set.law_name == by_set.parameters["controller"] == "tde_stc"
+    assert ControllerChoice(flight, LAW).law_name == "stranger"
+    by_set = ControllerChoice(flight, chosen={"controller": "tde_stc"})
+    assert by_set.law_name == by_set.settings.controller == "tde_stc"
 
 
 @pytest.mark.parametrize(("key", "figure"), [("robot", "end_effector"), ("case", "saturation")])
@@ -254,23 +263,20 @@ def test_analyze_reads_no_file_that_a_bag_names(
     assert "--trust" not in analyze(log)["unavailable"][figure]
 
 
-def test_numbers_in_the_bag_are_taken_and_those_of_a_swap_must_be_there(tmp_path: Path) -> None:
-    flight = described(controller_node={"gains": "secret.yaml"})
-    assert ControllerChoice(flight, tmp_path).is_as_flown
-    swapped = described(controller_node={"gains": "/secret.yaml", "swaps": ["0.1:ctc"]})
-    folder = tmp_path / "swapped"
-    folder.mkdir()
-    with pytest.raises(NotTrustedError, match=r"a file as its gains, .*: read only with --trust"):
-        ControllerChoice(swapped, folder)
-    swapped["parameters"]["controller"] |= {"ctc.k_p": [1e4], "ctc.k_d": [2e2]}
-    assert ControllerChoice(swapped, folder).swaps == ["0.1:ctc"]
+def test_gains_of_a_swap_must_be_in_the_bag() -> None:
+    flight = described(swaps=["0.1:ctc"])
+    gains = flight["scenario"]["gains"].pop("ctc")
+    with pytest.raises(InputError, match="unknown controller 'ctc' of swaps"):
+        ControllerChoice(flight)
+    flight["scenario"]["gains"]["ctc"] = gains
+    assert ControllerChoice(flight).swaps == ["0.1:ctc"]
 
 
 def test_on_the_command_line_it_is_one_line_and_an_option(
     bag: Path, tmp_path: Path, ran: Callable[[], bool], space_robot: Run
 ) -> None:
     copy = shutil.copytree(bag, tmp_path / "bag")
-    redescribed(copy, json.dumps(described(controller_node={"controller": LAW})))
+    redescribed(copy, json.dumps(described("stranger", controller=LAW)))
     code, _, err = space_robot("replay", copy)
     assert code == 2
     assert "--trust" in err.splitlines()[-1]

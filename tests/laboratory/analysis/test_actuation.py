@@ -44,7 +44,7 @@ def flown(**options: Any) -> FlightLog:
 def described(log: FlightLog, latency_ticks: int, base: float, joint: float) -> FlightLog:
     """The same flight as a bag tells it, with these limits of its torques."""
     plant = {"base_torque_limit": base, "joint_torque_limit": joint}
-    flight = {"command_latency_ticks": latency_ticks, "parameters": {"plant": plant}}
+    flight = {"command_latency_ticks": latency_ticks, "scenario": {"parameters": {"plant": plant}}}
     return replace(log, scenario=None, flight=flight)
 
 
@@ -181,7 +181,7 @@ def test_wheels_at_their_limits_are_counted_and_said(paper_robot: Robot) -> None
     log.wheel_velocities[15:40, 0] = -20.0
     log.wheel_velocities[:, 1] = 1e3  # without a limit
     log.wheel_torques[50, 2], log.wheel_velocities[49, 2] = 0.25, (2.0 - 0.25 * 0.0005) / 0.1
-    log.flight["parameters"] = {"plant": {"base_torque_limit": 0.5, "joint_torque_limit": 3.0}}
+    log.flight["scenario"] = {"parameters": {"plant": {"joint_torque_limit": 3.0}}}
     report = analyze(log)
     counted = report["metrics"].items()
     found = {name: x for name, x in counted if name.startswith("wheel") and "reve" not in name}

@@ -282,7 +282,7 @@ def test_errors_and_torques_are_the_true_ones(noisy: FlightLog) -> None:
     assert reported["joints_1_3.rms"] > 20.0 * true["joints_1_3.rms"]
     assert true["base_torque.rms"] == pytest.approx(0.999 * reported["base_torque.rms"], rel=1e-12)
     assert (report["truth_recorded"], told["truth_recorded"]) == (True, False)
-    h_bar = np.array(noisy.flight["gains_used"]["h_bar"])
+    h_bar = np.array(noisy.laws[0].gains["h_bar"])
     force = neglected_force(replace(noisy, measured=None), h_bar)
     assert noisy.telemetry is not None
     estimated = force[1:] - noisy.telemetry[1:-1, 2]
@@ -301,9 +301,7 @@ def test_without_telemetry_or_of_a_filter_there_is_none(noisy: FlightLog) -> Non
     report = analyze(noisy.rows(1, 15))
     assert "navigation_attitude.rms" not in report["metrics"]
     assert report["unavailable"]["navigation"] == "no telemetry was recorded"
-    log, parameters = replace(noisy, scenario=None), noisy.flight["parameters"]
-    controller = {**parameters["controller"], "navigation": "filtered"}
-    log.flight = {**log.flight, "parameters": {**parameters, "controller": controller}}
-    report = analyze(log)
+    flight = {**noisy.flight, "navigation": "filtered"}
+    report = analyze(replace(noisy, scenario=None, flight=flight))
     assert report["navigation"] == "filtered"
     assert "not recorded" in report["unavailable"]["estimate_error"]

@@ -190,7 +190,7 @@ def test_the_axis_that_points_is_that_of_the_first_pointing_segment(
 def test_a_flight_whose_mission_points_the_base_says_how_well(
     mission: dict[str, Any], points: bool
 ) -> None:
-    log = Scenario(duration=0.05).fly().log
+    log = Scenario(duration=0.05, orbit="iss").fly().log
     log.scenario = None
     log.flight["scenario"]["mission"] |= mission
     report = analyze(log)

@@ -53,7 +53,8 @@ def report() -> Report:
     log = Scenario(duration=1.0, faults=["noise_gyro@0:1e-9"]).fly().log
     log.latency_s = np.linspace(1e-4, 3e-4, log.ticks)
     log.scenario = None
-    log.flight["parameters"]["plant"] |= {"base_torque_limit": 1.0, "joint_torque_limit": 1.0}
+    limits = {"base_torque_limit": 1.0, "joint_torque_limit": 1.0}
+    log.flight["scenario"]["parameters"]["plant"] |= limits
     report = analyze(log)
     assert report["unavailable"] == {}
     counts = {"filled_ticks": 3, "unanswered_ticks": 4, "lost": {"a": 5, "b": 6}}
@@ -185,6 +186,7 @@ def test_motors_that_the_robot_has_not_are_told(driven: FlightLog) -> None:
 
 
 def test_a_file_that_a_bag_names_is_not_read(driven: FlightLog) -> None:
-    flight = {**driven.flight, "parameters": {"plant": {"orbit": "/etc/mine.yaml"}}}
+    scenario = {**driven.flight["scenario"], "orbit": "/etc/mine.yaml"}
+    flight = {**driven.flight, "scenario": scenario}
     said = "refers to a file as its orbit, '/etc/mine.yaml'"
     assert said in json.dumps(analyze(replace(driven, flight=flight)))

@@ -187,7 +187,7 @@ def test_a_log_is_of_what_was_flown_after_restoring_anything(parts: list[int], s
     assert log.commanded_torque is not None
     np.testing.assert_array_equal(log.commanded_torque, torques)
     assert [row.tobytes() for row in log.quaternion] == truths
-    assert log.flight["parameters"]["plant"]["fault_seed"] == seed
+    assert log.flight["scenario"]["seed"] == seed
 
 
 def test_by_hand_there_is_no_law(tmp_path: Path) -> None:
@@ -206,8 +206,8 @@ def test_by_hand_there_is_no_law(tmp_path: Path) -> None:
     metrics = json.loads(analyzed.stdout)["metrics"]
     assert metrics["attitude.rms"] == pytest.approx(flight.metrics["attitude.rms"])
     with pytest.raises(InputError, match=r"no law flew: .* name the law that shall answer"):
-        ControllerChoice({"controller": "none"}, tmp_path)
-    assert ControllerChoice({"controller": "none"}, tmp_path, "ctc").law_name == "ctc"
+        ControllerChoice({"controller": "none"})
+    assert ControllerChoice({"controller": "none"}, "ctc").law_name == "ctc"
 
 
 def test_a_law_with_a_hand_on_it_keeps_its_telemetry() -> None:

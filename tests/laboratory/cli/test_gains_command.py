@@ -101,7 +101,8 @@ def test_a_set_for_segments_is_in_the_bag_and_may_be_overruled(tmp_path: Path) -
     assert tune(tmp_path, "--mission", "line").exit_code == 0
     flight = Flight(resolve(Scenario(gains=str(tmp_path))))
     corner = flight.controller_settings.acceleration_filter_hz
-    assert flight.description["parameters"]["controller"]["acceleration_filter_hz"] == corner > 0.0
+    recorded = flight.description["scenario"]["parameters"]["controller"]
+    assert recorded["acceleration_filter_hz"] == corner > 0.0
     given = {"controller": {"acceleration_filter_hz": 7.0}}
     over = Flight(resolve(Scenario(gains=str(tmp_path), parameters=given)))
     assert over.controller_settings.acceleration_filter_hz == 7.0

@@ -200,9 +200,9 @@ def test_a_parameter_file_goes_over_the_arguments_and_into_the_bag(tmp_path: Pat
     )
     flight = launched_flight({"params_file": str(file), "controller": "tde_smc"}).flight
     assert flight.plant_settings.hold_ticks == 40
-    told = flight.description
-    assert told["parameters"]["plant"]["friction.viscous"] == 0.0
-    assert (told["controller"], told["gains_used"]["k_d"]) == ("ctc", [7.0] * 9)
+    told = flight.description["scenario"]
+    assert told["case"]["friction"]["viscous"] == 0.0
+    assert (told["controller"], told["gains"]["ctc"]["k_d"]) == ("ctc", [7.0] * 9)
 
 
 @pytest.mark.parametrize(

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 import space_robot as sr
 from space_robot.flight.flown_log import empty_log
 from space_robot.flight.simulate import close_loop
-from space_robot.scenario.comparison import recorded_scenario
+from space_robot.scenario.recorded import bag_options
 from space_robot_control.laws import laws
 from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.samples import Command
@@ -118,7 +118,7 @@ def test_a_flight_tells_its_sensors_and_what_its_filter_assumes() -> None:
     def described(**plan: Any) -> dict[str, Any]:
         return planned(duration=0.1, **plan).description
 
-    assert "navigation_filter" not in described()
+    assert described()["navigation"] == "direct"
     for sensors, controller, across in (
         ("tactical", {}, 4e-5),
         ("tactical", {"navigation_sensors": "coarse"}, 1e-4),
@@ -126,8 +126,9 @@ def test_a_flight_tells_its_sensors_and_what_its_filter_assumes() -> None:
     ):
         parameters = {"controller": controller}
         told = described(sensors=sensors, navigation="filtered", parameters=parameters)
-        assert told["sensors"] == told["parameters"]["plant"]["sensors"] == sensors
-        assert told["navigation_filter"]["tracker_across"] == across
+        assert (told["sensors"], told["navigation"]) == (sensors, "filtered")
+        assumed = told["scenario"]["parameters"]["controller"]["navigation_filter"]
+        assert assumed["tracker_across"] == across
     with pytest.raises(InputError, match="unknown sensor 'good': choose one of coarse, fine"):
         described(parameters={"controller": {"navigation_sensors": "good"}}, navigation="filtered")
 
@@ -173,7 +174,7 @@ def test_file_function_and_numbers_are_one_disturbance(
     assert SAID in space_robot("simulate", *options, "--bag", tmp_path / "bag").out
     assert json.loads(space_robot("simulate", *options, "--json").out)["disturbance"] == SAID
     file.unlink()
-    assert recorded_scenario(tmp_path / "bag")["disturbance"] == COLUMNS
+    assert bag_options(tmp_path / "bag")["disturbance"] == COLUMNS
     log = sr.load_bag(tmp_path / "bag")
     assert log.flight["disturbance"] == SAID
     undisturbed = sr.Scenario(duration=DURATION)

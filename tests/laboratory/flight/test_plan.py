@@ -85,7 +85,6 @@ def test_all_that_is_made_of_a_plan_agrees(plan: Planned) -> None:
     assert mission == flight.mission_settings
     said = empty_log(flight).flight
     assert said == flight.description
-    assert said["parameters"] == sent
     assert (said["case"], said["realtime"]) == (plant.case, plant.realtime)
     assert (said["gains"], said["seed"]) == (controller.gains, plant.fault_seed)
     assert said.get("faults", []) == [text for text in plant.faults if text]
@@ -97,7 +96,8 @@ def test_all_that_is_made_of_a_plan_agrees(plan: Planned) -> None:
     built = Laws(controller, len(robot.nominal.axis_names), gains)
     law = next(iter(built.values()))
     assert said["controller"] == law.name
-    assert said["gains_used"] == {name: row.tolist() for name, row in law.given_gains.items()}
+    own = {name: row.tolist() for name, row in law.given_gains.items()}
+    assert said["scenario"]["gains"].get(law.name, {}) == own
     theirs = Plant(find_robot(plant.robot), plant, plant.period)
     assert theirs.block.tobytes() == flight.plant.block.tobytes()
     assert theirs.command_delay_buffer.shape == flight.plant.command_delay_buffer.shape
@@ -138,7 +138,7 @@ def test_a_bag_has_all_to_fly_its_flight_again(tmp_path: Path) -> None:
     assert said == flight.description
     assert json.dumps(said) == json.dumps(Flight(resolve(plan)).description)
     assert (said["seed"], planned().description["seed"]) == (7, 0)
-    assert tuple(said["parameters"]) == NODES == tuple(MODULES)
+    assert tuple(said["scenario"]["parameters"]) == NODES == tuple(MODULES)
     robot = Robot.from_dict(said["robot_file"], where="the bag")
     np.testing.assert_array_equal(robot.inertia, flight.robot.inertia)
 

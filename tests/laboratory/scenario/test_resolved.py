@@ -208,7 +208,6 @@ def test_assumed_actuators_are_numbers_or_a_file(tmp_path: Path, as_numbers: boo
     assert other.axes == own.axes
     tree = flight.scenario.tree
     assert tree["assumed_actuators"]["wheels"]["rotor_inertia"] == other.rotor_inertia
-    assert "controller_base_actuators" in flight.description
     assert planned(**tree).scenario.tree == tree
     same = planned(actuators="wheels", assumed_actuators="wheels", duration=0.05)
     assert "assumed_actuators" not in same.scenario.tree

@@ -22,14 +22,10 @@ from hypothesis import strategies as st
 from space_robot.flight.replay.choice import ControllerChoice
 from space_robot.flight.replay.recording import COMPARED, Recording
 from space_robot.flight.replay.run import ReferenceStream, replay
-from space_robot_control.controller.gains import build_laws, split_gains
-from space_robot_control.controller.settings import ControllerNodeSettings
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.bag.folder import open_bag
 from space_robot_msgs_py.bag.reader import read_flight
 from space_robot_msgs_py.bag.recorder import BagRecorder
-from space_robot_msgs_py.config.files import named_file
-from space_robot_msgs_py.config.validation import read_yaml
 from space_robot_msgs_py.errors import InputError
 
 STATES = (topics.JOINT_STATES, topics.BASE_STATE)
@@ -141,24 +137,17 @@ def test_what_is_cut_is_told_as_analyze_does_and_what_is_whole_is_sent(
 
 
 def described(**options: Any) -> dict[str, Any]:
-    """A flight's description with all a bag may hold."""
-    flight = planned(**options)
-    law = flight.controller.law
-    return {
-        **flight.description,
-        "parameters": {"controller": flight.scenario.parameters["controller"]},
-        "gains_used": {name: row.tolist() for name, row in law.gain_values.items()},
-        "robot_file": read_yaml(named_file("robots", flight.scenario.options.robot)),
-    }
+    """A flight's description as a bag has it."""
+    description: dict[str, Any] = json.loads(json.dumps(planned(**options).description))
+    return description
 
 
 def test_robot_and_gains_are_the_recorded_numbers(tmp_path: Path) -> None:
     """Whatever the files of their names say here, and without them."""
     flight = described(swaps=["0.1:ctc"])
-    told = flight["parameters"]["controller"]
-    told |= {"tde_stc.k_1": [7.0] * 9, "robot": "/else/where.yaml", "gains": "/else/gains"}
+    flight["scenario"]["gains"]["tde_stc"]["k_1"] = [7.0] * 9
     flight["robot_file"]["robot"]["base"]["mass"] = 1234.5
-    choice = ControllerChoice(flight, tmp_path)
+    choice = ControllerChoice(flight)
     assert choice.is_as_flown
     # by their numbers: the default gains of this law are the printed ones
     for controller, gains, is_as_flown in (
@@ -167,17 +156,16 @@ def test_robot_and_gains_are_the_recorded_numbers(tmp_path: Path) -> None:
         ("", "tuned", False),
         ("ctc", "", False),
     ):
-        other = ControllerChoice(described(), tmp_path, controller, gains)
+        other = ControllerChoice(described(), controller, gains)
         assert other.is_as_flown is is_as_flown
     robot = choice.robot
     assert (robot.name, robot.mass[0], choice.law_name) == ("paper", 1234.5, "tde_stc")
     assert choice.swaps == ["0.1:ctc"]
-    own, gains = split_gains(choice.parameters)
-    laws = build_laws(ControllerNodeSettings.resolve(own), 9, gains)
+    _, _, laws = choice.build_supervisor()
     assert laws["tde_stc"].gain_values["k_1"].tolist() == [7.0] * 9
     assert "ctc" in laws
     with pytest.raises(InputError, match="does not say which law was flown"):
-        ControllerChoice({}, tmp_path)
+        ControllerChoice({})
 
 
 # Answered anew
