@@ -7,7 +7,8 @@ is added there; analysis, campaigns and the reference know it then.
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Container, Iterable, Iterator
+from contextlib import suppress
+from fnmatch import fnmatchcase
 from fnmatch import fnmatchcase
 from functools import lru_cache
 from importlib import import_module
@@ -167,9 +168,8 @@ def column_unit(name: str) -> str:
     column = name.rpartition(".")[0] or name
     for group in GROUPS.values():
         if isinstance(group, SeriesGroup):
-            for template, quantity in group.quantities.items():
-                if fnmatchcase(column, template):
-                    return quantity.unit
+            with suppress(StopIteration):
+                return group.quantity(column).unit
     return ""
 
 

@@ -51,10 +51,10 @@ def _resolved(path: Path) -> dict[str, Any]:
     from space_robot_msgs_py.config.validation import read_yaml, validate
 
     from ..flight.plan import Flight, Scenario, resolve
-    from ..scenario.recorded import bag_options
+    from ..scenario.recorded import options_in_bag
 
     if path.suffix not in (".yaml", ".yml"):
-        return bag_options(path)
+        return options_in_bag(path)
     return Flight(resolve(validate(Scenario, read_yaml(path), str(path)))).scenario.tree
 
 

@@ -6,7 +6,6 @@ described in its bag, and the same to the last bit as one of the command.
 
 from __future__ import annotations
 
-import json
 import shlex
 from collections.abc import Iterable, Mapping, Sequence
 from difflib import get_close_matches
@@ -56,16 +55,25 @@ class LaunchedFlight(NamedTuple):
 )
 @click.pass_context
 def _plan(
-    context: click.Context, /, bag: Path | None, namespace: str, **options: Any
+    context: click.Context,
+    /,
+    bag: Path | None,
+    namespace: str,
+    parameters: dict[str, dict[str, Any]],
+    **options: Any,
 ) -> LaunchedFlight:
+    from space_robot_msgs_py.config.files import merge
+
     from ..flight.flight_messages import default_bag
 
+    group, file = context.obj
     if context.get_parameter_source("namespace") is ParameterSource.DEFAULT:
         namespace = ""
     if not namespace.startswith("/"):  # as a node's in a launch file
-        namespace = f"{context.obj}/{namespace}"
-    flight = plan_flight(namespace=namespace, **options)
-    return LaunchedFlight(flight, bag or default_bag(flight), {})
+        namespace = f"{group}/{namespace}"
+    own, ros_parameters = _file_parameters(file, namespace)
+    flight = plan_flight(namespace=namespace, parameters=merge(parameters, own), **options)
+    return LaunchedFlight(flight, bag or default_bag(flight), ros_parameters)
 
 
 def launch_arguments() -> list[LaunchArgument]:
@@ -145,31 +153,27 @@ def launched_flight(values: Mapping[str, str], group: str = "") -> LaunchedFligh
     for option in _plan.params:
         if isinstance(option, click.Option) and (text := values.get(_name(option), "")):
             chosen[str(option.name)] = shlex.split(text) if option.multiple else text
-    own, ros_parameters = _file_parameters(values.get(PARAMS_FILE, ""))
-    set_in_file = [
-        f"{node}.{name}={json.dumps(value)}"
-        for node, parameters in own.items()
-        for name, value in parameters.items()
-    ]
-    chosen["parameters"] = [*chosen.get("parameters", ()), *set_in_file]
+    about = group, values.get(PARAMS_FILE, "")
     try:
         launched: LaunchedFlight = _plan.main(
-            [], "fly.launch.py", standalone_mode=False, obj=group, default_map=chosen
+            [], "fly.launch.py", standalone_mode=False, obj=about, default_map=chosen
         )
     except click.ClickException as error:
         raise InputError(error.format_message()) from None
     if faults := launched.flight.scenario.process_faults:
         raise InputError(f"fault {faults[0]}: that needs `space-robot fly`")
-    return launched._replace(ros_parameters=ros_parameters)
+    return launched
 
 
-def _file_parameters(file: str) -> tuple[dict[str, dict[str, Any]], dict[str, dict[str, Any]]]:
+def _file_parameters(
+    file: str, namespace: str
+) -> tuple[dict[str, dict[str, Any]], dict[str, dict[str, Any]]]:
     """Return the parameters of a ROS parameter file by node: those of the flight, and ROS's own."""
     from space_robot_msgs_py.config.files import flatten, is_of_ros, node_parameters
 
-    own: dict[str, dict[str, Any]] = {node: {} for node in NODES}
+    own: dict[str, dict[str, Any]] = {}
     ros_parameters: dict[str, dict[str, Any]] = {node: {} for node in NODES}
     for node in NODES if file else ():
-        for name, value in flatten(node_parameters(Path(file), node)):
-            (ros_parameters if is_of_ros(name) else own)[node][name] = value
+        for name, value in flatten(node_parameters(Path(file), node, namespace)):
+            (ros_parameters if is_of_ros(name) else own).setdefault(node, {})[name] = value
     return own, ros_parameters

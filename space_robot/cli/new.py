@@ -198,7 +198,7 @@ def new_robot(
       space-robot new arm.urdf --base-mass 300 --base-inertia 60,50,40 --at 0,0,0.6
       space-robot fly --robot my_robot --controller ctc
     """
-    from space_robot_model.robot.find import robot_as_path, robot_files
+    from space_robot_model.robot.find import robot_as_path, robot_files, split_choice
     from space_robot_msgs_py.errors import SpaceRobotError
 
     from ..choice.new_robot import SHORT, check_replaceable, make_robot
@@ -211,6 +211,8 @@ def new_robot(
 
     if base_inertia:
         base_inertia = [*base_inertia, 0.0, 0.0, 0.0][:6]
+    chosen = split_choice(robot)
+    robot, base, repair = chosen.name, base or chosen.base, repair or chosen.repair
     files = robot_files(robot_as_path(robot))
     words = ["space-robot", "new", robot, *(["--base", base] if base else [])]
     words += ["--repair"] if repair else []

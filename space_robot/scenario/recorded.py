@@ -17,7 +17,7 @@ from space_robot_sim.environment.events import named_targets
 
 from .scenario import Scenario
 
-FILES = (
+NAMED_FILES = (
     *("robot", "plant_robot", "case", "mission", "gains", "sensors", "navigation_sensors"),
     *("actuators", "assumed_actuators", "orbit", "disturbance", "disturbance.table"),
 )
@@ -34,7 +34,7 @@ class ChangedNumber(NamedTuple):
     second: Any
 
 
-def bag_options(bag: Path) -> Tree:
+def options_in_bag(bag: Path) -> Tree:
     """Return the options of a recorded flight with every number: its resolved scenario."""
     flight = read_description(open_bag(bag).custom_data())
     if "scenario" not in flight:
@@ -67,7 +67,7 @@ def recorded_scenario(options: Tree, trusted: bool, where: str = "scenario of th
     scenario = validate(Scenario, options, where)
     nodes = [dict(flatten(own)) for own in scenario.parameters.values()]
     for settings in () if trusted else (scenario.given, *nodes):
-        for what in FILES:
+        for what in NAMED_FILES:
             name = settings.get(what, "")
             if isinstance(name, str) and not name.startswith(JSON):
                 require_shipped_file(what.partition(".")[0], name)

@@ -60,13 +60,15 @@ def named_layers(kind: str, name: str) -> list[Path]:
     return [] if name == GIVEN else [named_file(kind, name)]
 
 
-def node_parameters(path: Path, node: str) -> Tree:
+def node_parameters(path: Path, node: str, namespace: str = "/") -> Tree:
     """Read the parameters of a node from a ROS parameter file, as a tree.
 
     They are below the keys ``/**``, the node's ROS name, or ``/**/`` and the name: ROS applies the
-    latter in any namespace, the name alone only in the root namespace.
+    latter in any namespace, the name alone only in the root namespace; or below the name in the
+    node's own ``namespace``.
     """
     merged: Tree = {}
+    names = "**", f"{node}_node", f"{namespace.strip('/')}/{node}_node"
     for name, content in read_yaml(path).items():
         if not isinstance(content, dict) or list(content) != ["ros__parameters"]:
             raise InputError(
@@ -75,7 +77,7 @@ def node_parameters(path: Path, node: str) -> Tree:
         parameters = content["ros__parameters"] or {}
         if not isinstance(parameters, dict):
             raise InputError(f"{path}: {name}: parameters were expected, got {short(parameters)}")
-        if str(name).strip("/").removeprefix("**/") in ("**", f"{node}_node"):
+        if str(name).strip("/").removeprefix("**/") in names:
             merged = merge(merged, nest(parameters))
     return merged
 

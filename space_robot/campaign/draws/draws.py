@@ -131,7 +131,11 @@ class Draws:
                 path = variable.paths[0]
                 options[path[1]] = variable.distribution.on(value_at(nominal.tree, path), value)
         if options:
-            nominal = self._nominal(law, options)
+            axes, nominal = nominal.names.axes, self._nominal(law, options)
+            if nominal.names.axes != axes and any(v.group == "gains" for v in self._variables):
+                raise InputError(
+                    "gains cannot be varied together with robots that have other joints"
+                )
         changed: dict[Path, Any] = {}
         for variable, value in drawn:
             for path in variable.paths if variable.group != "scenario" else ():

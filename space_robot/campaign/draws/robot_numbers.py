@@ -19,7 +19,7 @@ from space_robot_model.robot.shapes import plates_of
 from space_robot_msgs_py.config.files import Tree
 from space_robot_msgs_py.errors import InputError
 
-from .paths import Elements, Path, Unavailable
+from .paths import Elements, Path, Unavailable, value_at
 
 Array = NDArray[np.float64]
 XYZ = ("x", "y", "z")
@@ -40,22 +40,26 @@ LEAST = 0.01
 """Lower bound of positive quantities, as a factor of the nominal ones."""
 
 
-def robot_tree(robot: Robot) -> Tree:
-    """Return the numbers of a robot that can be varied; an inertia is a factor of the tensor."""
+def robot_tree(robot: Robot, plates: Sequence[Plate] | None = None) -> Tree:
+    """Return the numbers of a robot that can be varied; an inertia is a factor of the tensor.
+
+    ``plates``: in place of those of the robot's shapes.
+    """
     bodies = [
-        {"mass": float(mass), "inertia": 1.0, "com": Elements(dict(zip(XYZ, com, strict=True)))}
-        for mass, com in zip(robot.mass, robot.com.tolist(), strict=True)
+        {"mass": mass, "inertia": 1.0, "com": Elements(dict(zip(XYZ, com, strict=True)))}
+        for mass, com in zip(robot.mass.tolist(), robot.com.tolist(), strict=True)
     ]
     joints = robot.all_joint_names
-    plates = {
+    plates = plates_of(robot) if plates is None else plates
+    plate_numbers = {
         str(number): {field: getattr(plate, field) for field in PLATE_FIELDS}
-        for number, plate in enumerate(plates_of(robot), 1)
+        for number, plate in enumerate(plates, 1)
     }
     return {
         "base": bodies[0],
         "links": Elements(dict(zip(robot.body_names[1:], bodies[1:], strict=True)), joints),
         "joints": Elements({name: _joint(robot, joint) for joint, name in enumerate(joints)}),
-        "plates": Elements(plates, default="all"),
+        "plates": Elements(plate_numbers, default="all"),
     }
 
 
@@ -103,56 +107,43 @@ def robot_with(robot: Robot, numbers: Mapping[Path, float], has_surfaces: bool) 
 
     ``has_surfaces``: the plates derived from the nominal robot's shapes stay as they are.
     """
-    mass, inertia, com = robot.mass.copy(), robot.inertia.copy(), robot.com.copy()
-    friction, springs, gears = list(robot.friction), list(robot.springs), list(robot.gears)
-    links = {name: body for body, name in enumerate(robot.body_names)}
-    joints = {name: joint for joint, name in enumerate(robot.all_joint_names)}
     is_lit = has_surfaces or any(part == "plates" for part, *_ in numbers)
-    plates = list(plates_of(robot)) if is_lit else []
-    turns: dict[int, dict[str, float]] = {}
-    for (part, *inner), value in numbers.items():
-        if part == "plates":
-            plate = int(inner[0]) - 1
-            own: dict[str, Any] = {inner[1]: float(value)}
-            plates[plate] = replace(plates[plate], **own)
-        elif part == "joints":
-            joint, field = joints[inner[0]], inner[-1]
-            if inner[1] == "friction":
-                friction[joint] = friction[joint]._replace(**{field: value})
-            elif inner[1] == "drive":
-                gear = gears[joint]
-                assert gear
-                number: dict[str, Any] = {GEAR_FIELDS[field]: value}
-                gears[joint] = gear._replace(**number)
-            else:
-                spring = springs[joint - robot.n]
-                springs[joint - robot.n] = spring._replace(**{field: value})
+    tree = robot_tree(robot, plates := plates_of(robot) if is_lit else ())
+    for (*inner, name), value in numbers.items():
+        if inner[-1] == "inertia":
+            value_at(tree, tuple(inner[:-1])).setdefault("spread", {})[name] = float(value)
         else:
-            body = links[inner.pop(0)] if part == "links" else 0
-            match inner:
-                case ["mass"]:
-                    mass[body] = value
-                case ["com", axis]:
-                    com[body, XYZ.index(axis)] = value
-                case ["inertia"]:
-                    inertia[body] *= float(value)
-                case ["inertia", argument]:
-                    turns.setdefault(body, {})[argument] = float(value)
+            value_at(tree, tuple(inner))[name] = value
+    bodies, joints = [tree["base"], *tree["links"].values()], [*tree["joints"].values()]
+    com = np.array([[*body["com"].values()] for body in bodies])
+    inertia = robot.inertia * np.array([[[body["inertia"]]] for body in bodies])
+    for body, own in enumerate(bodies):
+        if arguments := own.get("spread"):
+            factors = [exp(arguments.get(name, 0.0)) for name in LOG_FACTORS]
+            turn = [arguments.get(name, 0.0) * (math.pi / 180.0) for name in ROTATIONS]
+            inertia[body] = spread(inertia[body], factors, turn)
+    varied = zip(plates, tree["plates"].values(), strict=True)
+    plates = tuple(replace(plate, **own) for plate, own in varied)
     _check_shares(plates)
-    for body, arguments in turns.items():
-        factors = [exp(arguments.get(name, 0.0)) for name in LOG_FACTORS]
-        turn = [arguments.get(name, 0.0) * (math.pi / 180.0) for name in ROTATIONS]
-        inertia[body] = spread(inertia[body], factors, turn)
     shift = -com[0]
     changed = replace(
         robot,
-        mass=mass,
+        mass=np.array([body["mass"] for body in bodies], float),
         inertia=inertia,
         com=com,
-        friction=tuple(friction),
-        springs=tuple(springs),
-        gears=tuple(gears),
-        plates=tuple(plates) or robot.plates,
+        friction=tuple(
+            own._replace(**{k: x for k, x in joint["friction"].items() if not isinstance(x, str)})
+            for own, joint in zip(robot.friction, joints, strict=True)
+        ),
+        springs=tuple(
+            own._replace(stiffness=joint["stiffness"], damping=joint["damping"])
+            for own, joint in zip(robot.springs, joints[robot.n :], strict=True)
+        ),
+        gears=tuple(
+            gear and gear._replace(**{GEAR_FIELDS[k]: v for k, v in joint["drive"].items()})
+            for gear, joint in zip(robot.gears, joints, strict=False)
+        ),
+        plates=plates or robot.plates,
     )
     return _with_base_moved(changed, shift) if shift.any() else changed
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shlex
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -259,7 +260,7 @@ class Findings:
     def rerun_command(self, run: int, law: str) -> str:
         """Return the command that flies a row again and records a bag."""
         words = ["space-robot", "campaign", "rerun", str(self.folder), str(run), "--law", law]
-        bag = f"flights/{run}_{law.replace('/', '_').replace('=', '_')}"
+        bag = f"flights/{run}_{re.sub('[^A-Za-z0-9.-]', '_', law)}"
         trust = ["--trust"] if needs_trust(self.study) else []
         return shlex.join([*words, "--bag", bag, *trust])
 

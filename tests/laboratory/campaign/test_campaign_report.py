@@ -74,8 +74,8 @@ def test_every_command_flies_a_row_of_the_campaign() -> None:
     assert words[:4] == ["space-robot", "campaign", "rerun", "campaigns/a b"]
     assert ("--bag" in words, "--trust" in words) == (True, False)
     assert findings.rerun_command(8, "ctc").startswith("space-robot campaign rerun 'campaigns/a b'")
-    named = shlex.split(findings.rerun_command(3, "ctc=/my gains/x"))
-    assert named[-1] == "flights/3_ctc__my gains_x"
+    named = shlex.split(findings.rerun_command(3, "mine.py:Law=/my gains/x"))
+    assert named[-1] == "flights/3_mine.py_Law__my_gains_x"
 
 
 def test_the_worst_are_failures_then_the_largest() -> None:

@@ -236,7 +236,10 @@ def test_parameters_of_every_ros_node_go_to_the_nodes_unchanged(tmp_path: Path) 
         "  ros__parameters:\n"
         "    hold_ticks: 40\n"
         "    qos_overrides: {/clock: {publisher: {depth: 7}}}\n"
+        "/sat1/plant_node: {ros__parameters: {hold_ticks: 50}}\n"
     )
+    in_space = launched_flight({"params_file": str(file)}, "/sat1").flight
+    assert in_space.plant_settings.hold_ticks == 50
     flight, _, ros_parameters = launched_flight({"params_file": str(file)})
     assert flight.scenario.options.parameters == {"plant": {"hold_ticks": 40}}
     everywhere = {"use_sim_time": True}

@@ -53,7 +53,7 @@ def test_the_analysis_counts_what_the_targets_bring(bag: tuple[Path, FlightLog])
         assert f"events: {', '.join(EVENTS)}" in remarks(report)
     lines = control_results(bag[1], "").axes[0].get_lines()
     assert sum(list(line.get_xdata()) in ([0.1, 0.1], [0.2, 0.2]) for line in lines) == 2
-    del log.flight["events"]
+    log.flight["scenario"]["events"] = []
     assert analyze(log)["metrics"]["momentum_drift.relative"] > 0.1
 
 
@@ -61,7 +61,7 @@ def test_a_file_that_a_bag_names_is_opened_only_if_it_is_trusted(
     bag: tuple[Path, FlightLog], tmp_path: Path
 ) -> None:
     log = read_flight(bag[0])
-    log.flight["events"] = [f"capture@0.1:{tmp_path / 'target.yaml'}"]
+    log.flight["scenario"]["events"] = [f"capture@0.1:{tmp_path / 'target.yaml'}"]
     report = analyze(log)
     assert "momentum_robot.max" not in report["metrics"]
     assert "the bag refers to a file as its target" in report["unavailable"]["momentum"]
@@ -148,7 +148,7 @@ def test_what_is_met_is_counted_by_the_analysis(
         assert report["metrics"]["momentum_outside.max"] > 1.0
         assert report["metrics"]["momentum_drift.relative"] < 1e-11
     faster = target.motion.model_copy(update={"velocity": [0.2, -0.1, 0.2]})
-    recorded.flight["events"] = events_of(target.model_copy(update={"motion": faster}))
+    recorded.flight["scenario"]["events"] = events_of(target.model_copy(update={"motion": faster}))
     assert analyze(recorded)["metrics"]["momentum_drift.relative"] > 1e-3
 
 

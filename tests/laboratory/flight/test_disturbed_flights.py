@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 import space_robot as sr
 from space_robot.flight.flown_log import empty_log
 from space_robot.flight.simulate import close_loop
-from space_robot.scenario.recorded import bag_options
+from space_robot.scenario.recorded import options_in_bag
 from space_robot_control.laws import laws
 from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.samples import Command
@@ -174,7 +174,7 @@ def test_file_function_and_numbers_are_one_disturbance(
     assert SAID in space_robot("simulate", *options, "--bag", tmp_path / "bag").out
     assert json.loads(space_robot("simulate", *options, "--json").out)["disturbance"] == SAID
     file.unlink()
-    assert bag_options(tmp_path / "bag")["disturbance"] == COLUMNS
+    assert options_in_bag(tmp_path / "bag")["disturbance"] == COLUMNS
     log = sr.load_bag(tmp_path / "bag")
     assert log.flight["disturbance"] == SAID
     undisturbed = sr.Scenario(duration=DURATION)
