@@ -7,8 +7,8 @@ is added there; analysis, campaigns and the reference know it then.
 from __future__ import annotations
 
 import math
+from collections.abc import Collection, Container, Iterable, Iterator
 from contextlib import suppress
-from fnmatch import fnmatchcase
 from fnmatch import fnmatchcase
 from functools import lru_cache
 from importlib import import_module
