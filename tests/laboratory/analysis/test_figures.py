@@ -45,7 +45,6 @@ from space_robot.analysis.figures.base_torque import (
 from space_robot.analysis.figures.figure_set import FigureSet
 from space_robot.analysis.figures.overlay import FlightCurves, base_pointing
 from space_robot.analysis.figures.style import LineStyle, house_style, thinned
-from space_robot.analysis.momentum import momentum_of
 from space_robot.analysis.plotted import PlottedQuantity, quantities_of
 from space_robot_control.guidance.mission import Mission, MissionSettings
 from space_robot_model.hardware.base_actuators import BaseActuatorSettings
@@ -343,31 +342,6 @@ def figure_of(log: FlightLog, kind: str) -> tuple[Figure, list[PlottedQuantity]]
     """The figure of a kind, and the quantities on it."""
     found = [q for _, q in quantities_of(AnalysedLog(log), [kind]) if q.is_drawn]
     return kind_figure(log, found), found
-
-
-def test_momentum_and_wheels_between_their_limits(paper_robot: Robot) -> None:
-    """Of a free base what arm and base exchange."""
-    log = lively_log(paper_robot, hardware(wheels=WHEELS))
-    found = momentum_of(log)
-    figure, quantities = figure_of(log, "momentum")
-    titles = ["angular momentum", "robot momentum", "momentum of all wheels"]
-    assert [quantity.title for quantity in quantities] == titles
-    assert legend_names(figure) == [["x", "y", "z"]]
-    for axes, wanted in zip(figure.axes, (found.total, found.robot, found.wheels), strict=True):
-        shown = [data_of(line)[1].tolist() for line in axes.get_lines()]
-        assert all(wanted[:, i].tolist() in shown for i in range(3))
-    _, quantities = figure_of(lively_log(paper_robot, FREE), "momentum")
-    assert [q.title for q in quantities][1:] == ["base momentum", "arm momentum"]
-    above, below = figure_of(log, "wheels")[0].axes
-    for axes, values, limit in (
-        (above, log.wheel_velocities * 0.01, 3.0),
-        (below, log.wheel_torques, 0.5),
-    ):
-        ordinates = [data_of(line)[1] for line in axes.get_lines()]
-        shown = [y for y in ordinates if len(y) == log.ticks]
-        assert len(shown) == 4
-        assert all(any(np.allclose(y, column) for y in shown) for column in values.T)
-        assert sorted(y[0] for y in ordinates if len(y) == 2) == [-limit, limit]
 
 
 @pytest.mark.parametrize("ticks", [1, 1300])
