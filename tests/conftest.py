@@ -169,12 +169,6 @@ def paper_robot() -> Robot:
     return Robot.from_yaml(ROBOTS / "paper.yaml")
 
 
-@pytest.fixture(scope="session")
-def seven_joint_robot() -> Robot:
-    """A smaller satellite with 7 joints and products of inertia."""
-    return Robot.from_yaml(ROBOTS / "seven_joint.yaml")
-
-
 @pytest.fixture
 def space_robot(capsys: pytest.CaptureFixture[str]) -> Run:
     """Run a `space-robot` command to its end, in this process."""

@@ -44,8 +44,3 @@ class Defect(NamedTuple):
 
 ROWS = yaml.safe_load((DATA / "refusals/urdf.yaml").read_text("utf-8"))
 DEFECTS = {name: Defect.of(row) for name, row in ROWS.items()}
-
-
-def with_defect(name: str) -> str:
-    """The good URDF with that defect."""
-    return DEFECTS[name].urdf

@@ -14,7 +14,7 @@ from space_robot.analysis.errors import tracking_error
 from space_robot.flight.flown_log import empty_log
 from space_robot.flight.plan import Flight, Scenario, resolve
 from space_robot.flight.simulate import close_loop
-from space_robot_control.controller.controller import TRANSFER_S, Controller
+from space_robot_control.controller.controller import Controller
 from space_robot_control.controller.gains import build_law
 from space_robot_control.controller.law_choice import Swap, parse_swaps
 from space_robot_control.laws import laws
@@ -51,7 +51,6 @@ NOMINAL = [f"{name} nominal" for name, law in laws().items() if "h_bar" in law.g
 LAWS = sorted([*laws(), *NOMINAL])
 TAKEOVER, STOP = 2000, 2060
 """Ticks: at 1 s the arm moves on all its joints; flown until 1.03 s."""
-TRANSFER = round(TRANSFER_S / PERIOD)
 ACCURATE = [name for name in LAWS if name.startswith(("ctc", "tde", "indi"))]
 """Laws that know or estimate every force, and so have small errors in motion."""
 

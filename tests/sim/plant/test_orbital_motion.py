@@ -215,7 +215,6 @@ def test_the_reach_is_the_largest_distance_and_what_is_missed_changes_no_bit(
 HEIGHT = 420e3
 N = np.sqrt(MU / (EARTH_RADIUS + HEIGHT) ** 3)
 """rad/s."""
-NO_J2 = circular_orbit(HEIGHT, j2=False)
 ECCENTRIC = {
     "height": 17.7e6,
     "eccentricity": 0.7,
