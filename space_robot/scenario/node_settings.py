@@ -56,6 +56,7 @@ NOT_TO_BE_SET = {
     "controller.join_timeout": "use --join-timeout",
     "controller.wait_for": _WAITING,
     "controller.listener_timeout": _WAITING,
+    "mission.wait_for": _WAITING,
     "mission.goto": "it is for a mission in flight: use space-robot goto",
     "recorder.bag": "use --bag",
     "recorder.flight": "it is what the flight's options say",

@@ -13,7 +13,7 @@ from pydantic import Field, field_validator
 from space_robot_model.robot.find import YAML, new_command, robot_files
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.config.files import GIVEN, named_layers
-from space_robot_msgs_py.config.settings import NodeSettings, Texts
+from space_robot_msgs_py.config.settings import NodeSettings, Texts, WaitFor
 from space_robot_msgs_py.config.validation import one_of, read_yaml, short
 from space_robot_msgs_py.config.yaml_text import check_readable, is_folder
 from space_robot_msgs_py.errors import InputError
@@ -180,11 +180,7 @@ class ControllerNodeSettings(NodeSettings):
     state_timeout: Annotated[float, Field(ge=0.001, le=1e6)] = Field(
         2.0, description="time without a state after which this is reported, s of the wall clock"
     )
-    wait_for: Texts = Field(
-        [""],
-        description="subscribers to wait for before the first command: NODE:TOPIC, or NODE for "
-        "all topics",
-    )
+    wait_for: WaitFor = Field([""])
     listener_timeout: Annotated[float, Field(ge=0.0, le=1e6)] = Field(
         0.0, description="longest time to wait for wait_for, s of the wall clock (0: no limit)"
     )

@@ -36,7 +36,6 @@ MOST_OWED_S = 60.0
 class MissionLoop:
     """Loop that follows /clock and streams the reference ahead of it."""
 
-    wait_for = ()
     is_complete = False
 
     def __init__(
@@ -44,6 +43,7 @@ class MissionLoop:
     ) -> None:
         """Read the robot and the mission."""
         self._node, self._settings = node, settings
+        self.wait_for = settings.wait_for
         robot = find_robot(settings.robot)
         self._mission = Mission(robot, settings, settings.period)
         self._codec = ReferenceCodec(robot.joint_names, settings.timebase)

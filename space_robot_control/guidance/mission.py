@@ -20,11 +20,12 @@ from space_robot_model.robot.find import mission_layers
 from space_robot_model.robot.mission_document import Rates, mission_layer
 from space_robot_msgs_py.config.columns import read_columns
 from space_robot_msgs_py.config.files import Tree
-from space_robot_msgs_py.config.settings import NodeSettings, Texts
+from space_robot_msgs_py.config.settings import NodeSettings, Texts, WaitFor
 from space_robot_msgs_py.config.validation import StrictModel
 from space_robot_msgs_py.config.yaml_text import YamlTextError, parse_yaml
 from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.samples import ReferenceChunk
+from space_robot_msgs_py.topics import REFERENCE_BASE, REFERENCE_JOINTS, Topic
 
 from .courses import BaseMotion, Piece, SteadyTurn
 from .goals import PointingGoal
@@ -82,6 +83,7 @@ class MissionNodeSettings(MissionSettings, NodeSettings):
 
     node: ClassVar[str] = "mission"
     selectors: ClassVar[tuple[str, ...]] = ("robot", "mission")
+    sends: ClassVar[tuple[Topic, ...]] = (REFERENCE_JOINTS, REFERENCE_BASE)
 
     mission: str = Field(
         "",
@@ -99,6 +101,7 @@ class MissionNodeSettings(MissionSettings, NodeSettings):
     lead_ticks: Annotated[int, Field(ge=1, le=10_000)] = Field(
         1000, description="lead of the reference ahead of the plant, ticks"
     )
+    wait_for: WaitFor = Field([""])
 
     @classmethod
     def layers(cls, selected: Mapping[str, str]) -> list[Path]:

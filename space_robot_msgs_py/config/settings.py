@@ -25,6 +25,9 @@ SHORTEST_PERIOD = 1e-5
 """Shortest tick, s."""
 Texts = Annotated[list[str], AfterValidator(lambda texts: texts or [""])]
 """List of texts; empty texts are ignored, because ROS has no empty list of strings."""
+WaitFor = Annotated[
+    Texts, Field(description="subscribers to wait for before sending: NODE, or NODE:TOPIC")
+]
 
 
 class NodeSettings(StrictModel):

@@ -15,7 +15,7 @@ from space_robot_model.robot.find import mission_layers
 from space_robot_model.robot.mission_document import Rates, mission_layer
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.config.files import Tree, named_layers
-from space_robot_msgs_py.config.settings import NodeSettings, Texts
+from space_robot_msgs_py.config.settings import NodeSettings, Texts, WaitFor
 from space_robot_msgs_py.config.validation import StrictModel
 from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.samples import RobotNames
@@ -174,11 +174,7 @@ class PlantNodeSettings(PlantSettings, NodeSettings):
         description="messages per simulated second on each of base/odometry, base/imu and "
         "base/wrench that has a subscriber (0: none)",
     )
-    wait_for: Texts = Field(
-        [""],
-        description="subscribers to wait for before the first tick: NODE:TOPIC, or NODE for all "
-        "topics",
-    )
+    wait_for: WaitFor = Field([""])
 
     @property
     def events_folder(self) -> Path:

@@ -42,7 +42,7 @@ def reset_with(absent: Collection[str] = ()) -> list[str]:
 
 
 def wait_for(node: str, absent: Collection[str] = ()) -> list[str]:
-    """Return the parameter ``wait_for`` of the plant or the controller in a whole graph.
+    """Return the parameter ``wait_for`` of a node in a whole graph.
 
     ``absent``: nodes that have ended, or are not started.
     """
@@ -62,7 +62,7 @@ AWAITED = {
 def published_topics(nodes: Sequence[str]) -> list[topics.Topic]:
     """Return the topics that nodes of these names must or may publish."""
     may = [topic for schema in SCHEMAS if schema.node in nodes for topic in schema.sends]
-    return [*may, *(topic for node in nodes for topic in AWAITED[node])]
+    return list(dict.fromkeys([*may, *(topic for node in nodes for topic in AWAITED[node])]))
 
 
 class OwnNodes:

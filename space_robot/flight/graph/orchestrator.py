@@ -164,7 +164,8 @@ def flight_parameters(flight: Flight, bag: Path, folder: Path) -> dict[str, dict
         "wait_for": wait_for("plant", absent),
         "reset_with": reset_with(absent),
     }
-    parameters["controller"] |= {"wait_for": wait_for("controller", absent)}
+    for node in ("controller", "mission"):
+        parameters[node]["wait_for"] = wait_for(node, absent)
     if "controller" in options.without:
         parameters["plant"] |= {"own_controller": True, "join_timeout": options.join_timeout}
     elif options.without:

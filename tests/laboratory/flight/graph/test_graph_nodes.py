@@ -67,7 +67,7 @@ def test_start_up_in_any_order(
     ground.until(lambda: "plant_node" in ground.monitor.modes, "the plant")
     controller = start("controller", wait_for=wait_for("controller"))
     ground.until(lambda: "controller_node" in ground.monitor.modes, "the controller")
-    mission = start("mission")
+    mission = start("mission", wait_for=wait_for("mission"))
     recorder = start("recorder", bag=tmp_path / "bag")
     output, _ = plant.communicate(timeout=90)
     assert plant.returncode == 0, output
