@@ -78,9 +78,8 @@ class SingularAttitudeError(UnusableStateError):
     """The base is 180 degrees from its desired attitude, where J0 of (1) is singular."""
 
     def __init__(self, tick: int) -> None:
-        super().__init__(
-            tick,
+        why = (
             "the base is 180 degrees from its desired attitude, where J0 of eq. (1) is singular "
-            "and no command exists",
-            "attitude error near 180 degrees",
+            "and no command exists"
         )
+        super().__init__(tick, why, "attitude error near 180 degrees")

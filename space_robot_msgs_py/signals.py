@@ -78,10 +78,6 @@ class Signal(Field):
         """Return how many numbers a robot with these `RobotNames` has in a message."""
         return self.size if isinstance(self.size, int) else len(getattr(names, self.size.names))
 
-    def column_width(self, names: Any) -> int:
-        """Return how many numbers a robot with these `RobotNames` has in a log."""
-        return 0 if self.reporter is Reporter.ORBIT and not names.in_orbit else self.width(names)
-
 
 def signal(reporter: Reporter, size: int | Each, unit: str, frame: str, text: str) -> Any:
     """Declare a `Signal`.

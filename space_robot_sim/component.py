@@ -84,7 +84,7 @@ class Component(Record):
     @staticmethod
     def is_fitted(sheet: Any) -> bool:
         """Return whether a robot with this sheet has the component; its record is zero if not."""
-        return True
+        return bool(getattr(sheet, "count", True))
 
     @staticmethod
     def refresh(record: Any) -> None:

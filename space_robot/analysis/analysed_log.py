@@ -26,8 +26,7 @@ from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.topics import BASE_AXES
 
 from . import described
-from .errors import AxisIndex, attitude_error, axis_groups, controls_base, error_columns
-from .errors import torque_columns as columns_of_torque
+from .errors import AxisIndex, attitude_error, axis_groups, controls_base
 
 Array = NDArray[np.float64]
 
@@ -134,13 +133,15 @@ class AnalysedLog:
 
     @cached_property
     def error_columns(self) -> dict[str, AxisIndex]:
-        """The axes of each error column."""
-        return error_columns(self.groups)
+        """The axes of each error column of Table V."""
+        groups = self.groups.items()
+        return {"attitude" if k == "base" else f"joints_{k}": axes for k, axes in groups}
 
     @cached_property
     def torque_columns(self) -> dict[str, AxisIndex]:
-        """The axes of each torque column."""
-        return columns_of_torque(self.groups)
+        """The axes of each torque column of Table V."""
+        names = {"base": "base_torque", "prismatic": "force_prismatic"}
+        return {names.get(k, f"torque_{k}"): axes for k, axes in self.groups.items()}
 
     @cached_property
     def axis_names(self) -> list[str]:
@@ -190,7 +191,7 @@ class AnalysedLog:
 
     def sum_up(self, function: Callable[[int, int], Any]) -> Array:
         """Return the sum of what a function makes of the rows of each block."""
-        total: Array = np.sum(self.each_block(function), axis=0)
+        total: Array = np.sum([function(*block) for block in self.blocks()], axis=0)
         return total
 
     def part(self, window: range) -> AnalysedLog:

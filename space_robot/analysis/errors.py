@@ -66,17 +66,6 @@ def axis_groups(
     return groups
 
 
-def error_columns(groups: dict[str, AxisIndex]) -> dict[str, AxisIndex]:
-    """Return the axes of each error column of Table V."""
-    return {"attitude" if k == "base" else f"joints_{k}": axes for k, axes in groups.items()}
-
-
-def torque_columns(groups: dict[str, AxisIndex]) -> dict[str, AxisIndex]:
-    """Return the axes of each torque column of Table V."""
-    names = {"base": "base_torque", "prismatic": "force_prismatic"}
-    return {names.get(k, f"torque_{k}"): axes for k, axes in groups.items()}
-
-
 def tracking_error(log: FlightLog) -> Array:
     """Compute ``e = rho_d - rho = [-eps_e, theta_d - theta]`` (N, n+3): -, then rad or m.
 

@@ -95,9 +95,10 @@ def evaluate(
 
     ``groups``: names of the groups to compute, where no metrics are ``wanted``.
     """
-    first = flight.log.first_tick
-    ticks = (window or Window()).ticks(first + flight.log.ticks, flight.period)
-    rows = range(max(ticks.start - first, 0), max(ticks.stop - first, 0))
+    first, rows = flight.log.first_tick, range(flight.log.ticks)
+    if window:
+        ticks = window.ticks(first + flight.log.ticks, flight.period)
+        rows = range(max(ticks.start - first, 0), max(ticks.stop - first, 0))
     if not rows:
         return {}, {}
     numbers: dict[str, float] = {}
@@ -147,7 +148,7 @@ def all_metrics() -> Iterator[tuple[MetricGroup, str, Definition]]:
 def _registered(name: str) -> tuple[MetricGroup | None, Definition]:
     for group, template, quantity in all_metrics():
         if fnmatchcase(name, pattern(template)):
-            unit = quantity.unit.replace("{unit}", column_unit(name))
+            unit = quantity.unit.replace("{unit}", column_definition(name).unit)
             return group, quantity._replace(unit=unit)
     return None, Definition("", "")
 
@@ -163,14 +164,14 @@ def describe(name: str) -> Definition:
 
 
 @lru_cache(maxsize=4096)
-def column_unit(name: str) -> str:
-    """Return the unit of a column, or of the column of a metric; of none it is empty."""
-    column = name.rpartition(".")[0] or name
+def column_definition(name: str) -> Definition:
+    """Return unit and meaning of a column, or of the column of a metric; of none it is empty."""
+    own = name.rpartition(".")[0] or name
     for group in GROUPS.values():
         if isinstance(group, SeriesGroup):
             with suppress(StopIteration):
-                return group.quantity(column).unit
-    return ""
+                return group.quantity(own)
+    return Definition("", "")
 
 
 def column_label(column: str) -> str:

@@ -27,7 +27,7 @@ from .errors import (
     tracking_error,
 )
 from .external_torques import torques_by_source
-from .measure import column_label, column_unit
+from .measure import column_definition, column_label
 from .momentum import Momentum, momentum_of
 from .series import GROUPS, SeriesGroup
 from .tool_path import ToolPath, leads_tool
@@ -140,7 +140,7 @@ def _joints(flight: AnalysedLog) -> Quantities:
     for name, axes in flight.error_columns.items():
         if name != "attitude":
             title, labels = f"{column_label(name)} error", _names(flight, axes)
-            unit = column_unit(name)
+            unit = column_definition(name).unit
             yield PlottedQuantity(title, unit, labels, error[:, axes], is_error=True)
 
 
@@ -213,7 +213,7 @@ def _torques(flight: AnalysedLog) -> Quantities:
     for name, axes in flight.torque_columns.items():
         title, labels = column_label(name), _names(flight, axes)
         values = flight.log.applied_torque[:, axes]
-        yield PlottedQuantity(title, column_unit(name), labels, values)
+        yield PlottedQuantity(title, column_definition(name).unit, labels, values)
 
 
 @plotted(
@@ -345,7 +345,7 @@ def _series(
     blocks = [sizes for _, sizes in series.sizes(flight)]
     for column in columns:
         values = np.concatenate([sizes[column] for sizes in blocks])[:, np.newaxis]
-        title, unit = f"{column_label(column)} error", column_unit(column)
+        title, unit = f"{column_label(column)} error", column_definition(column).unit
         yield PlottedQuantity(
             title, unit, ["size"], values, limits=limits, is_error=True, is_shown=False
         )

@@ -25,11 +25,10 @@ if TYPE_CHECKING:
     import jinja2
 
 IN_BRIEF = (
-    *("errors", "steadiness", "drift", "navigation", "torques", "roughness", "ripple"),
+    *("errors", "drift", "navigation", "torques", "roughness", "ripple", "missed_captures"),
     *("wheel_saturation", "wheel_reversals", "standing", "beyond_limits", "effort_used"),
-    "missed_captures",
 )
-"""Groups of metrics that `rms_table`, its remarks and `warnings` show."""
+"""Groups of metrics that `rms_table`, its remarks and `warnings` show of any flight."""
 DESCRIBED = ("controller", "case", "gains", "robot")
 """Keys of a flight's description that a report repeats."""
 
@@ -78,7 +77,8 @@ def analyze(
 
 def _in_brief(flight: AnalysedLog) -> list[str]:
     has_hardware = flight.log.wheel_velocities.shape[1] or flight.log.thrusts.shape[1]
-    return [*IN_BRIEF, *(["sizing"] if has_hardware else [])]
+    points = flight.pointed_axis is not None
+    return [*IN_BRIEF, *(["sizing"] if has_hardware else []), *(["steadiness"] if points else [])]
 
 
 def _flown(flight: AnalysedLog, flight_ticks: int) -> dict[str, Any]:

@@ -12,7 +12,7 @@ from space_robot_msgs_py.topics import BASE_AXES
 
 from ..console.tables import NONE, Column, Group, JudgedCell, Row, Table
 from .described import IDEAL
-from .measure import column_unit, describe, group_of
+from .measure import column_definition, describe, group_of
 from .series import GROUPS
 from .words import Report, analyzed, flown, law_of, notes, of_statistic, remarks, seen_through
 
@@ -44,7 +44,7 @@ def rms_table(report: Report) -> Table:
         Column("power >\n100 Hz", spec=".2e"),
         Column("ripple", spec=".2e"),
     )
-    torques = {name for name in names if column_unit(name).startswith("N")}
+    torques = {name for name in names if column_definition(name).unit.startswith("N")}
     is_wide = any(metrics[f"{name}.rms"] >= WIDE for name in torques)
     rows: list[list[Any]] = []
     for name in names:
@@ -52,18 +52,13 @@ def rms_table(report: Report) -> Table:
         both = (metrics.get(key.format(name)) for key in ("{}.rms", second))
         rms = ["" if value is None else format(value, spec) for value in both]
         rough = (metrics.get(f"{name}.{key}", "") for key in ("variation", "chatter", "ripple"))
-        rows.append([short_name(name), column_unit(name), *rms, *rough])
+        rows.append([name.removesuffix("_angle"), column_definition(name).unit, *rms, *rough])
     return Table(title, columns, [Group(rows)], remarks(report))
 
 
 def table_v_columns(metrics: Mapping[str, float]) -> list[str]:
     """Return the columns of errors and torques of Table V; of the attitude that of its angles."""
-    return [c for c in of_statistic(metrics, "rms_eq64") if describe(f"{c}.rms").is_shown]
-
-
-def short_name(column: str) -> str:
-    """Return the name of a column that has its unit elsewhere."""
-    return column.removesuffix("_angle")
+    return [c for c in of_statistic(metrics, "rms_eq64") if column_definition(c).is_shown]
 
 
 def metrics_table(report: Report) -> Table:

@@ -12,7 +12,7 @@ from space_robot_msgs_py.bag.law_history import in_words
 from ..flight.start_step import sentence
 from .actuation import LIMIT_KINDS, LONG_STANDING
 from .errors import FREE
-from .measure import column_unit
+from .measure import column_definition
 
 Report = dict[str, Any]
 Metrics = Mapping[str, float]
@@ -149,7 +149,7 @@ def limit_cycles(metrics: Metrics) -> Iterator[str]:
     """Say which torques oscillate at one frequency, by more than a share of what they do."""
     cycles = [
         f"{name} at {metrics[f'{name}.ripple_peak_hz']:.3g} Hz with {peak:.2g} "
-        f"{column_unit(name)} RMS"
+        f"{column_definition(name).unit} RMS"
         for name, peak in of_statistic(metrics, "ripple_peak").items()
         if metrics[f"{name}.ripple_peak_hz"] <= FASTEST_CYCLE
         and metrics.get(f"{name}.ripple_lasting", 0.0) >= LASTING_CYCLE

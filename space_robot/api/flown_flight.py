@@ -304,7 +304,8 @@ def fly_in_process(
             progress(tick * flight.period)
 
     try:
-        log, ending = simulate(flight, bag, show), Ending.complete(flight.ticks, flight.period)
+        log = simulate(flight, bag, show, is_kept=keep_log)
+        ending = Ending.complete(flight.ticks, flight.period)
     except FlightError as error:
         if error.log is None:
             raise

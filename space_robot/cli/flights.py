@@ -97,7 +97,8 @@ def simulate(as_json: bool, bag: Path | None, **options: Any) -> None:
         check_bag_path(bag)
     for remark in filter(None, (*remarks_on(flight), bag_remark(flight) if bag else "")):
         click.echo(remark, err=True)
-    _ = flight.supervisor  # compiled, or refused, before anything is begun
+    if flight.flies_by_messages:
+        _ = flight.supervisor  # compiled, or refused, before anything is begun
     compile_kernels(bool(flight.plant.names.actuators))  # it has a progress line of its own
     began = time.monotonic()
     with flight_progress(flight.ticks * flight.period, flight.law.name) as show:

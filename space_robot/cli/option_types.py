@@ -49,18 +49,6 @@ class NumberList(click.ParamType[list[float]]):
         return numbers
 
 
-class NameOrNumbers(click.ParamType[Any]):
-    """A name or a path; in a scenario file also a mapping of the numbers."""
-
-    name = "text"
-
-    def convert(
-        self, value: Any, param: click.Parameter | None, context: click.Context | None
-    ) -> Any:
-        """Return the value unchanged."""
-        return value
-
-
 def names_in(folder: str, others: Sequence[str] = ()) -> Complete:
     """Return the completion of a value: names of ``config/<folder>``, ``others``, or a path."""
 

@@ -11,7 +11,7 @@ import click
 from click.core import ParameterSource
 
 from ..scenario.options import OPTIONS
-from .option_types import NameOrNumbers, names_in
+from .option_types import names_in
 
 if TYPE_CHECKING:
     from space_robot_msgs_py.bag.flight_log import FlightLog
@@ -148,7 +148,7 @@ def _click_option(name: str) -> Decorator:
     if option.choices:
         settings["type"] = click.Choice(option.choices)
     elif option.kind is Any:
-        settings["type"] = NameOrNumbers()
+        settings["type"] = click.UNPROCESSED  # in a scenario file also a mapping of numbers
     elif option.kind is int and option.high is not None:
         settings["type"] = click.IntRange(int(option.low or 0), int(option.high))
     elif option.kind is not bool:

@@ -9,12 +9,12 @@ from typing import Any
 import click
 
 from ..console.tables import Column, JudgedCell, Table, named
-from .option_types import FiniteRange, NameOrNumbers, names_in
+from .option_types import FiniteRange, names_in
 from .options import file_option, flight_options, resolve_options
 
 
 @click.command()
-@click.argument("mission", default="", type=NameOrNumbers(), shell_complete=names_in("missions"))
+@click.argument("mission", default="", type=click.UNPROCESSED, shell_complete=names_in("missions"))
 @flight_options("robot", "orbit", "actuators", "period", "scenario_of_flight", "set", "json")
 @click.option(
     "--base-torque",

@@ -6,6 +6,7 @@ import math
 import shutil
 import tempfile
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,13 +25,16 @@ MAPPED_FROM = 2**30
 """Bytes from which on a log lies in files, which have no names and go with it."""
 
 
-def flight_log(flight: Flight, ticks: int | None = None) -> FlightLog:
+def flight_log(
+    flight: Flight, ticks: int | None = None, description: dict[str, Any] | None = None
+) -> FlightLog:
     """Return the log of the first ``ticks`` (None: all) before they are flown, see `empty_log`."""
     ticks = flight.ticks if ticks is None else ticks
     if (size := ticks * row_bytes(flight)) < MAPPED_FROM:
-        return empty_log(flight, 0, ticks)
+        return empty_log(flight, 0, ticks, description=description)
     check_room(size, f"duration {ticks * flight.period:g} s")
-    log = empty_log(flight, 0, ticks, mapped, flight.mission.chunk(0, 1))
+    first = flight.mission.chunk(0, 1)
+    log = empty_log(flight, 0, ticks, mapped, first, description=description)
     joints, base = log.reference_joints, log.reference_base
     log.reference_joints = mapped((ticks, *joints.shape[1:]))
     log.reference_base = mapped((ticks, *base.shape[1:]))
@@ -74,17 +78,20 @@ def empty_log(
     allocate: Callable[[tuple[int, ...]], Array] = of_nan,
     reference: ReferenceChunk | None = None,
     is_brief: bool = False,
+    description: dict[str, Any] | None = None,
 ) -> FlightLog:
     """Return the log of the ticks ``start`` to ``stop`` (None: the last) before the flight.
 
     The reference alone is known; it may have been computed. ``allocate`` makes the columns that the
-    flight fills. ``is_brief``: with what metrics need only, see `Flight.brief`.
+    flight fills. ``is_brief``: with what metrics need only, see `Flight.brief`. ``description``:
+    of the flight (None: all that is known).
     """
+    if description is None:
+        description = flight.brief if is_brief else flight.description
     log = allocate_columns(
         flight, (flight.ticks if stop is None else stop) - start, allocate, is_brief
     )
-    log.first_tick, log.scenario = start, flight.scenario
-    log.flight = flight.brief if is_brief else flight.description
+    log.first_tick, log.scenario, log.flight = start, flight.scenario, description
     log.lost = {topic.full_name: 0 for topic in topics.ALL}
     reference = reference or flight.mission.chunk(start, log.ticks)
     log.reference_joints, log.reference_base = reference.joints, reference.base
@@ -130,6 +137,6 @@ def ended_early(block: FlightLog, measured: int, answered: int) -> FlightLog:
 
 def row_bytes(flight: Flight) -> int:
     """Return the size of a tick in a log."""
-    row = empty_log(flight, 0, 1)
+    row = allocate_columns(flight, 1)
     columns = [*row.columns.values(), *(row.measured.columns.values() if row.measured else ())]
     return sum(column.nbytes for column in columns)

@@ -34,7 +34,10 @@ STRETCH_TICKS, STRETCH_OF_MESSAGES = 10_000, 1_000
 
 
 def simulate(
-    flight: Flight, bag: Path | None = None, progress: Callable[[int], None] = lambda tick: None
+    flight: Flight,
+    bag: Path | None = None,
+    progress: Callable[[int], None] = lambda tick: None,
+    is_kept: bool = True,
 ) -> FlightLog:
     """Fly every tick of ``flight`` into one log, which lies in a file if it is large.
 
@@ -44,6 +47,7 @@ def simulate(
         flight: a checked plan; its plant is flown on from where it stands.
         bag: where to write the messages the graph would have sent (None: nowhere).
         progress: called now and then with the ticks flown.
+        is_kept: False: the log is for a report only, and described by `Flight.brief`.
 
     Raises:
         FlightError: the flight diverged or met a singular attitude. Its ``log`` goes up to the last
@@ -54,7 +58,7 @@ def simulate(
     flight.check_in_process()
     if flight.flies_by_messages:
         return _flown_by_messages(flight, bag, progress)
-    log = flight_log(flight)
+    log = flight_log(flight, description=None if is_kept else flight.brief)
     choice = LawChoice(flight.law, flight.swaps)
     with recording(flight, bag) as messages:
         try:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from inspect import isabstract, isclass
 from pathlib import PurePath
 from typing import Any
@@ -63,26 +64,22 @@ def _plain(value: Any) -> Any:
     return [_plain(inner) for inner in value] if isinstance(value, (list, tuple, range)) else value
 
 
-def _settings(schema: type[StrictModel], more: tuple[str, ...] = ()) -> Callable[[Any], Any]:
-    def check(value: Any) -> str | Tree:
-        if not isinstance(value, (Mapping, BaseModel)):
-            return _name(value, f"{schema.__name__} (an object or a mapping)")
-        tree = nest(_plain(value))
-        if isinstance(value, BaseModel):  # one of more, as the plant's settings, holds these
-            tree = {key: tree[key] for key in (*schema.model_fields, *more) if key in tree}
-        own = {key: inner for key, inner in tree.items() if key not in more}
-        validate(schema, own, "numbers given")
-        return tree
-
-    return check
+def _settings(schema: type[StrictModel], value: Any, more: tuple[str, ...] = ()) -> str | Tree:
+    if not isinstance(value, (Mapping, BaseModel)):
+        return _name(value, f"{schema.__name__} (an object or a mapping)")
+    tree: Tree = nest(_plain(value))
+    if isinstance(value, BaseModel):  # one of more, as the plant's settings, holds these
+        tree = {key: tree[key] for key in (*schema.model_fields, *more) if key in tree}
+    own = {key: inner for key, inner in tree.items() if key not in more}
+    validate(schema, own, "numbers given")
+    return tree
 
 
 def _mission(value: Any) -> str | Tree:
     if isinstance(value, Mapping) and "start" in (tree := nest(_plain(value))):
         document_settings(tree, "mission")
         return tree
-    checked: str | Tree = _settings(MissionSettings, OF_PLANT)(value)
-    return checked
+    return _settings(MissionSettings, value, OF_PLANT)
 
 
 def _robot(value: Any) -> str | Robot | Tree:
@@ -225,11 +222,11 @@ CONVERTERS: Mapping[str, Callable[[Any], Any]] = {
     "controller": _law,
     "gains": _gains,
     "mission": _mission,
-    "case": _settings(EnvironmentSettings),
-    "sensors": _settings(SensorSettings),
-    "actuators": _settings(ActuatorSettings),
-    "assumed_actuators": _settings(BaseActuatorSettings),
-    "orbit": _settings(OrbitSettings),
+    "case": partial(_settings, EnvironmentSettings),
+    "sensors": partial(_settings, SensorSettings),
+    "actuators": partial(_settings, ActuatorSettings),
+    "assumed_actuators": partial(_settings, BaseActuatorSettings),
+    "orbit": partial(_settings, OrbitSettings),
     "disturbance": as_disturbance,
     "events": _plain,
     "namespace": lambda value: full_namespace(value) if isinstance(value, str) else value,

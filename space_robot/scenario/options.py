@@ -8,6 +8,7 @@ imported, not even Pydantic, so that ``--help`` is quick.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any, Literal, get_args, get_origin, get_type_hints
 
 
@@ -39,7 +40,7 @@ class Option:
     is_list: bool = False
     choices: tuple[str, ...] = ()
 
-    @property
+    @cached_property
     def help_text(self) -> str:
         """Return the help with the names of the files and the default."""
         from space_robot_msgs_py.config.installation import config_directory

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from operator import attrgetter
 from typing import Any
 
@@ -200,10 +200,10 @@ def _mission(scenario: ResolvedScenario) -> Tree:
     return scenario.mission.model_dump(mode="json", include=own) | start
 
 
-def _plant_numbers(schema: type[BaseModel]) -> Callable[[ResolvedScenario], Tree]:
+def _plant_numbers(schema: type[BaseModel], scenario: ResolvedScenario) -> Tree:
     own = {*schema.model_fields} - {"events", *SAME_IN_PLANT}
     table = {"disturbance": {"table"}}  # an option of its own
-    return lambda scenario: scenario.plant.model_dump(mode="json", include=own, exclude=table)
+    return scenario.plant.model_dump(mode="json", include=own, exclude=table)
 
 
 def _disturbance(scenario: ResolvedScenario) -> Tree | str:
@@ -244,7 +244,7 @@ ALWAYS_SHOWN: Mapping[str, Callable[[ResolvedScenario], Any]] = {
     "robot": lambda scenario: scenario.robots.options["robot"],
     "mission": _mission,
     "events": lambda scenario: [text for text in scenario.plant.events if text.strip()],
-    **{name: _plant_numbers(SECTIONS[name]) for name in ("case", "sensors", "actuators")},
+    **{name: partial(_plant_numbers, SECTIONS[name]) for name in ("case", "sensors", "actuators")},
     "duration": lambda scenario: scenario.ticks * scenario.plant.period,
     **{name: attrgetter(f"plant.{name}") for name in SAME_IN_PLANT},
     "navigation": attrgetter("controller.navigation"),
@@ -255,7 +255,7 @@ ALWAYS_SHOWN: Mapping[str, Callable[[ResolvedScenario], Any]] = {
 SHOWN_IF_SET: Mapping[str, Callable[[ResolvedScenario], Any]] = {
     "plant_robot": lambda scenario: scenario.robots.options.get("plant_robot"),
     "orbit": lambda scenario: (
-        _plant_numbers(OrbitSettings)(scenario) if scenario.plant.has_orbit else "none"
+        _plant_numbers(OrbitSettings, scenario) if scenario.plant.has_orbit else "none"
     ),
     "disturbance": _disturbance,
     "assumed_actuators": _assumed_actuators,

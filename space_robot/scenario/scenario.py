@@ -47,8 +47,9 @@ class Scenario(StrictModel, Options):
         from .objects import CONVERTERS
 
         name = str(field.field_name)
-        is_absent = value is None and cls.model_fields[name].default is None
-        return value if is_absent or name not in CONVERTERS else CONVERTERS[name](value)
+        default = cls.model_fields[name].default
+        is_default = type(value) is type(default) and value == default
+        return value if is_default or name not in CONVERTERS else CONVERTERS[name](value)
 
     def replace(self, **options: Any) -> Self:
         """Return a copy of the scenario with these options changed."""

@@ -253,16 +253,20 @@ class Controller(RecordOwner):
         return memory.s, memory.u, signals.n_hat, signals.error
 
 
+STATUS_WORDS = (
+    *("usable", "state not finite", "state too large", "quaternion not unit"),
+    "attitude error near 180 degrees",
+)
+"""What is wrong with a state, in a word or two, by its status."""
+
+
 def unusable(status: int, tick: int, quaternion: Array) -> UnusableStateError:
     """Return the error to raise for a state of a ``status`` other than `USABLE`."""
     if status == SINGULAR:
         return SingularAttitudeError(tick)
+    why = "the state is not finite"
     if status == NOT_UNIT:
-        length = norm(quaternion)
-        why = f"the base's quaternion has norm {length:.6g}, not 1"
-        return UnusableStateError(tick, why, "quaternion not unit")
-    if status == TOO_LARGE:
-        return UnusableStateError(
-            tick, f"the state has a number beyond {LARGEST:g}", "state too large"
-        )
-    return UnusableStateError(tick, "the state is not finite", "state not finite")
+        why = f"the base's quaternion has norm {norm(quaternion):.6g}, not 1"
+    elif status == TOO_LARGE:
+        why = f"the state has a number beyond {LARGEST:g}"
+    return UnusableStateError(tick, why, STATUS_WORDS[status])

@@ -36,16 +36,16 @@ def read_gains(path: Path, law: type[ControlLaw], axes: int) -> dict[str, Array]
     tree = node_parameters(path, ControllerNodeSettings.node)
     if not isinstance(tree.get(law.name), dict):
         raise InputError(f"{path}: {law.name}: missing (the gains of this law)")
-    return check_gains(tree[law.name], law, axes, str(path), remake_advice(path))
+    return check_gains(tree[law.name], law, axes, str(path), path)
 
 
 def check_gains(
-    content: Tree, law: type[ControlLaw], axes: int, where: str, advice: str = ""
+    content: Tree, law: type[ControlLaw], axes: int, where: str, file: Path | None = None
 ) -> dict[str, Array]:
     """Return gains as (axes,) arrays; a list of one value applies to all axes.
 
-    ``where`` names the source in errors; ``advice`` says what to do where the gains are for another
-    number of axes. Optional gains that are not in ``content`` are not in the result.
+    ``where`` names the source in errors, ``file`` is that of the gains, if they are from one.
+    Optional gains that are not in ``content`` are not in the result.
 
     Raises:
         InputError: a gain is missing, unknown, of the wrong length or out of its range.
@@ -66,6 +66,7 @@ def check_gains(
         if values.shape not in ((axes,), (1,)):
             listed = ", ".join(f"{value:g}" for value in np.ravel(values)[:3])
             got = f"[{listed}]" if values.size <= 3 else f"{values.size}: [{listed}, ...]"
+            advice = remake_advice(file) if file else ""
             raise InputError(f"{key}: {gain_lengths(axes)} were expected, got {got}{advice}")
         fits = values > 0.0 if name in STRICTLY_POSITIVE else values >= 0.0
         if name in FRACTIONS:

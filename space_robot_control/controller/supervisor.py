@@ -27,11 +27,11 @@ from space_robot_msgs_py.wire.telemetry import NODE, LawCodec, SignalsCodec, Tel
 from ..allocation.allocation import Diagnosis
 from ..laws import ControlLaw
 from ..laws.base import CompiledLaw, LawCode, force_of
-from .controller import Controller, unusable
+from .controller import STATUS_WORDS, Controller
 from .law_choice import LawChoice
 from .reference_buffer import ReferenceBuffer
 from .settings import ControllerNodeSettings
-from .signals import SINGULAR, USABLE
+from .signals import USABLE
 from .tick import (
     NEW,
     Supervision,
@@ -46,11 +46,7 @@ from .tick import (
 Array = NDArray[np.float64]
 
 
-KINDS = (
-    *(unusable(status, 0, np.zeros(4)).kind for status in range(SINGULAR + 1)),
-    "reference held",
-    "no reference",
-)
+KINDS = (*STATUS_WORDS, "reference held", "no reference")
 """What is wrong with a state or its reference, in a word or two, by its status."""
 
 

@@ -127,8 +127,9 @@ class MissionDocument(StrictModel):
 
     def parameters(self) -> Tree:
         """Return the same as settings of a mission, with the plant's start and events."""
-        start = self.start.base or StartBase(rpy_deg=[0.0, 0.0, 0.0])
-        base, rate = np.asarray(start.unit_quaternion).tolist(), start.rate_deg_s
+        base, rate = [1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 0.0]
+        if start := self.start.base:
+            base, rate = np.asarray(start.unit_quaternion).tolist(), start.rate_deg_s
         parameters: Tree = {
             "joints_deg": self.start.joints_deg,
             "segments": [json.dumps(segment) for segment in self.segments],

@@ -162,9 +162,9 @@ class FlightLog(StateSignals):
         """
         if not isinstance(names, RobotNames):
             names = RobotNames(names)
-        widths = {name: (s.column_width(names),) for name, s in signals_of(StateSignals).items()}
         shapes: dict[str, tuple[int, ...]] = {
-            **widths,
+            **{name: (signal.width(names),) for name, signal in signals_of(StateSignals).items()},
+            **({} if names.in_orbit else dict.fromkeys(ORBIT_FIELDS, (0,))),
             "reference_joints": (3, len(names.joints)),
             "reference_base": (10,),
             "actuator_commands": (len(names.actuators),),
@@ -325,8 +325,11 @@ class FlightLog(StateSignals):
 
     def rows(self, start: int, stop: int) -> FlightLog:
         """The rows ``start`` to ``stop``: views, not copies. Counts stay those of the whole log."""
-        rows = _with_columns(self, lambda column: column[start:stop])
-        return replace(rows, first_tick=self.first_tick + start)
+        columns: dict[str, Any] = {name: c[start:stop] for name, c in self.columns.items()}
+        if self.measured is not None:
+            measured = (column[start:stop] for column in self.measured.columns.values())
+            columns["measured"] = MeasuredStates(*measured)
+        return replace(self, **columns, first_tick=self.first_tick + start)
 
 
 def finite_rows(columns: Iterable[Array]) -> NDArray[np.bool_]:
@@ -334,13 +337,6 @@ def finite_rows(columns: Iterable[Array]) -> NDArray[np.bool_]:
     each = (np.isfinite(column.reshape(len(column), -1)).all(axis=1) for column in columns)
     finite_rows: NDArray[np.bool_] = np.logical_and.reduce(list(each))
     return finite_rows
-
-
-def _with_columns(log: FlightLog, change: Callable[[Array], Array]) -> FlightLog:
-    columns: dict[str, Any] = {name: change(column) for name, column in log.columns.items()}
-    if log.measured is not None:
-        columns["measured"] = MeasuredStates(*map(change, log.measured.columns.values()))
-    return replace(log, **columns)
 
 
 def _beside(joints: Array, passive: Array) -> Array:

@@ -67,7 +67,10 @@ class _KernelCache(_FunctionCache):  # type: ignore[misc]
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """Load a compiled function; None if it is not in the cache."""
         rtsys.initialize(target_context)  # what machine code calls
-        return self._load_overload(sig, target_context)
+        loaded = self._load_overload(sig, target_context)
+        if loaded is None:
+            from . import lane_type  # noqa: F401 - what the compiler knows of the words of `lanes`
+        return loaded
 
     def save_overload(self, sig: Any, data: Any) -> None:
         """Save a compiled function if there is room; else the next process compiles it again."""

@@ -16,10 +16,10 @@ from typing import Any, ClassVar
 import numpy as np
 from llvmlite import ir
 from numba.core import cgutils, types
-from numba.core.imputils import lower_builtin, lower_cast
+from numba.core.imputils import lower_cast
 from numba.core.registry import cpu_target
 from numba.core.typeconv.castgraph import Conversion
-from numba.core.typing.templates import AbstractTemplate, infer_global, signature
+from numba.core.typing.templates import signature
 from numba.extending import models, register_model
 
 from .lanes import (
@@ -35,6 +35,7 @@ from .lanes import (
     whole,
     with_lane,
 )
+from .record_type import RecordType, array_over, defines
 
 _Build = Callable[..., Any]
 DOUBLE, BIT, INDEX = ir.DoubleType(), ir.IntType(1), ir.IntType(32)
@@ -75,27 +76,11 @@ LANE, MASK = LaneType(), MaskType()
 
 
 def array_of_lanes(ndim: int) -> Any:
-    """Return the type of an array of lanes; loads do not rely on its alignment."""
-    return types.Array(LANE, ndim, "C", aligned=False)
+    """Return the type of an array of lanes, or of one; loads do not rely on its alignment."""
+    return types.Array(LANE, ndim, "C", aligned=False) if ndim else LANE
 
 
-def array_over(
-    context: Any, builder: Any, kind: Any, data: Any, shape: Any, strides: Any, itemsize: int
-) -> Any:
-    """Emit an array of a Numba type over memory that something else owns."""
-    from numba.np import arrayobj  # only the compiler needs it
-
-    array = arrayobj.make_array(kind)(context, builder)
-    arrayobj.populate_array(
-        array,
-        data=data,
-        shape=cgutils.pack_array(builder, shape),
-        strides=cgutils.pack_array(builder, strides),
-        itemsize=cgutils.intp_t(itemsize),
-        meminfo=None,
-        parent=None,
-    )
-    return array._getvalue()
+RecordType.of_lanes = staticmethod(array_of_lanes)
 
 
 @register_model(LaneType)
@@ -154,30 +139,6 @@ def _some_lanes(args: Any) -> bool:
 
 def _some_masks(args: Any) -> bool:
     return MASK in args and all(isinstance(kind, _CONDITIONS) for kind in args)
-
-
-def defines(function: Any, typing: Callable[..., Any], *kinds: tuple[Any, ...]) -> Any:
-    """Return a decorator: what it decorates emits ``function`` for arguments of these kinds.
-
-    Args:
-        function: as kernels call it.
-        typing: from the arguments' types to the signature; None: these are not for us.
-        kinds: classes of types.
-    """
-
-    class Template(AbstractTemplate):
-        key = function
-
-        def generic(self, args: Any, kws: Any) -> Any:
-            return None if kws else typing(*args)
-
-    def decorate(emit: _Build) -> _Build:
-        infer_global(function)(Template)
-        for kind in kinds:
-            lower_builtin(function, *kind)(emit)
-        return emit
-
-    return decorate
 
 
 def _define_all(

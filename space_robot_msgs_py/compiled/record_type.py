@@ -15,18 +15,19 @@ from __future__ import annotations
 
 import hashlib
 import operator
+from collections.abc import Callable
 from functools import cache
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numba.core import cgutils, imputils, types
 from numba.core.pythonapi import NativeValue
 from numba.core.registry import cpu_target
+from numba.core.typing import templates
 from numba.core.typing.templates import AttributeTemplate, infer_getattr, signature
 from numba.core.typing.typeof import typeof_impl
 from numba.extending import models, register_model, unbox
 
-from .lane_type import LANE, array_of_lanes, array_over, defines
 from .records import Dimension, Layout, Polynomial, layout_of
 
 BYTES = 8
@@ -37,8 +38,53 @@ _typeof_array = typeof_impl.dispatch(np.ndarray)
 _typeof_scalar = typeof_impl.dispatch(np.generic)
 
 
+def defines(function: Any, typing: Callable[..., Any], *kinds: tuple[Any, ...]) -> Any:
+    """Return a decorator: what it decorates emits ``function`` for arguments of these kinds.
+
+    Args:
+        function: as kernels call it.
+        typing: from the arguments' types to the signature; None: these are not for us.
+        kinds: classes of types.
+    """
+
+    class Template(templates.AbstractTemplate):
+        key = function
+
+        def generic(self, args: Any, kws: Any) -> Any:
+            return None if kws else typing(*args)
+
+    def decorate(emit: Callable[..., Any]) -> Callable[..., Any]:
+        templates.infer_global(function)(Template)
+        for kind in kinds:
+            imputils.lower_builtin(function, *kind)(emit)
+        return emit
+
+    return decorate
+
+
+def array_over(
+    context: Any, builder: Any, kind: Any, data: Any, shape: Any, strides: Any, itemsize: int
+) -> Any:
+    """Emit an array of a Numba type over memory that something else owns."""
+    from numba.np import arrayobj  # only the compiler needs it
+
+    array = arrayobj.make_array(kind)(context, builder)
+    arrayobj.populate_array(
+        array,
+        data=data,
+        shape=cgutils.pack_array(builder, shape),
+        strides=cgutils.pack_array(builder, strides),
+        itemsize=cgutils.intp_t(itemsize),
+        meminfo=None,
+        parent=None,
+    )
+    return array._getvalue()
+
+
 class RecordType(types.Type):
     """Numba type of a record with a layout, of numbers ``width`` flights wide (1 or 8)."""
+
+    of_lanes: ClassVar[Callable[[int], Any]]  # set by `lane_type`, which the compiler imports
 
     def __init__(self, layout: Layout, width: int = 1) -> None:
         self.layout, self.width = layout, width
@@ -58,7 +104,7 @@ class RecordType(types.Type):
         """Return the type of a field with so many dimensions."""
         if self.width == 1:
             return types.Array(types.float64, ndim, "C") if ndim else types.float64
-        return array_of_lanes(ndim) if ndim else LANE
+        return RecordType.of_lanes(ndim)
 
 
 @cache

@@ -60,13 +60,12 @@ def check_readable(path: Path) -> None:
 
 @contextmanager
 def _opened(path: Path) -> Iterator[BinaryIO]:
-    name = shortened(str(path) if str(path).isprintable() else repr(str(path)), LONGEST_NAME)
     try:
         # opening a pipe must not block
         descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
         try:
             if not stat.S_ISREG(os.fstat(descriptor).st_mode):
-                raise InputError(f"{name}: not a file")
+                raise InputError(f"{_shown(path)}: not a file")
             with os.fdopen(descriptor, "rb", closefd=False) as file:
                 yield file
         finally:
@@ -74,11 +73,15 @@ def _opened(path: Path) -> Iterator[BinaryIO]:
     except InputError:
         raise
     except FileNotFoundError:
-        raise InputError(f"{name}: no such file{_similar_file(path)}") from None
+        raise InputError(f"{_shown(path)}: no such file{_similar_file(path)}") from None
     except OSError as error:
-        raise InputError(f"{name}: cannot be read ({error.strerror})") from None
+        raise InputError(f"{_shown(path)}: cannot be read ({error.strerror})") from None
     except ValueError as error:  # not UTF-8, or an invalid file name
-        raise InputError(f"{name}: cannot be read ({error})") from None
+        raise InputError(f"{_shown(path)}: cannot be read ({error})") from None
+
+
+def _shown(path: Path) -> str:
+    return shortened(str(path) if str(path).isprintable() else repr(str(path)), LONGEST_NAME)
 
 
 def _similar_file(path: Path) -> str:

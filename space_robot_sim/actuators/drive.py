@@ -26,6 +26,7 @@ than the smallest eigenvalue of ``a H_S^-1 H_bar``. What the drives give (a) mat
 from __future__ import annotations
 
 from decimal import Decimal
+from functools import partial
 from typing import Any, ClassVar
 
 import numpy as np
@@ -106,11 +107,8 @@ def lag_decays(lag: float, period: float) -> tuple[float, float]:
     return float(decay), float((1 - decay) / ratio)
 
 
-def _decays(which: int) -> Source:
-    def decays(sheet: Any, at: Any) -> list[float]:
-        return [lag_decays(lag, at.period)[which] for lag in per_axis(sheet, "drive_lag", at.n)]
-
-    return decays
+def _decays(which: int, sheet: Any, at: Any) -> list[float]:
+    return [lag_decays(lag, at.period)[which] for lag in per_axis(sheet, "drive_lag", at.n)]
 
 
 class Drive(Component):
@@ -124,9 +122,9 @@ class Drive(Component):
     """N m; 0: any torque can be given."""
     dead_band: Array = shaped(lambda n: (n + 3,), source=_axes("drive_dead_band"))
     """N m."""
-    decay: Array = shaped(lambda n: (n + 3,), source=_decays(0))
+    decay: Array = shaped(lambda n: (n + 3,), source=partial(_decays, 0))
     """``exp(-T / tau)`` of the lag; 0 without one."""
-    mean_decay: Array = shaped(lambda n: (n + 3,), source=_decays(1))
+    mean_decay: Array = shaped(lambda n: (n + 3,), source=partial(_decays, 1))
     """``tau / T (1 - exp(-T / tau))``; 0 without a lag."""
     lagging: Array = shaped(lambda n: (n + 3,))
     """The lag's output at the current tick, N m."""

@@ -7,6 +7,7 @@ is determined in `space_robot_sim.plant.integrator`; this module computes the fr
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Annotated, ClassVar
 
 import numpy as np
@@ -17,7 +18,7 @@ from space_robot_model.dynamics.model import MOST_JOINTS, MOST_MOVING
 from space_robot_model.robot import Robot
 from space_robot_msgs_py.compiled.kernels import kernel
 from space_robot_msgs_py.compiled.lanes import uniform, whole
-from space_robot_msgs_py.compiled.records import Source, shaped
+from space_robot_msgs_py.compiled.records import shaped
 from space_robot_msgs_py.config.validation import StrictModel
 
 from ..component import Component, Installation
@@ -52,11 +53,8 @@ def coefficients(robot: Robot, settings: FrictionSettings) -> Array:
     return np.where(np.isnan(own), usual, own)
 
 
-def _in_model_order(column: int) -> Source:
-    def values(settings: FrictionSettings, at: Installation) -> Array:
-        return np.asarray(coefficients(at.robot, settings)[list(at.robot.order), column])
-
-    return values
+def _in_model_order(column: int, settings: FrictionSettings, at: Installation) -> Array:
+    return np.asarray(coefficients(at.robot, settings)[list(at.robot.order), column])
 
 
 class Friction(Component):
@@ -66,9 +64,9 @@ class Friction(Component):
     """Number of joints and wheels; the rest of the arrays is unused."""
     row: Array = shaped(lambda n: (MOST_JOINTS,), source=lambda s, at: np.argsort(at.robot.order))
     """Row of each joint in the other arrays, which are in the order of `Model`."""
-    coulomb: Array = shaped(lambda n: (MOST_MOVING,), source=_in_model_order(0))
+    coulomb: Array = shaped(lambda n: (MOST_MOVING,), source=partial(_in_model_order, 0))
     """f_C, N m."""
-    viscous: Array = shaped(lambda n: (MOST_MOVING,), source=_in_model_order(1))
+    viscous: Array = shaped(lambda n: (MOST_MOVING,), source=partial(_in_model_order, 1))
     """f_V, N m s/rad."""
     set_valued: float = shaped(lambda n: (), uniform=True, source="set_valued")
     """0 for the sign alone, 1 for friction that holds joints at rest."""

@@ -26,8 +26,6 @@ def mount_wheels(
 ) -> None:
     """Mount ``wheels`` on a plant's base, with friction, and their ``velocities`` at tick 0."""
     count = wheels.count
-    if not count:
-        return
     assign(model, wheel_count=count)
     model.wheel_axis[:count] = wheels.unit_axes
     model.wheel_inertia[:count] = wheels.values("rotor_inertia")
@@ -53,8 +51,6 @@ def mount_gears(robot: Robot, model: Model, friction: Friction, x: Array) -> Non
     state at tick 0, see `space_robot_sim.plant.integrator.Stages`.
     """
     joints, n = geared_joints(robot), robot.joint_count
-    if not joints:
-        return
     check_rotors(robot)
     first = n + int(model.wheel_count)
     assign(model, rotor_count=len(joints))
@@ -110,8 +106,6 @@ def check_springs(robot: Robot, joint_positions: Array, step: float, substeps: i
     ``joint_positions`` (N,) are those at tick 0; ``substeps`` make a tick.
     """
     joints = geared_joints(robot)
-    if not joints:
-        return
     fastest = flexible_model(robot, joint_positions).fastest
     if step * fastest < STABLE:
         return

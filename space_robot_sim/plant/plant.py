@@ -81,7 +81,7 @@ class Plant(RecordOwner):
         self.block = PlantMemory.block(n)
         """The plant's `PlantMemory`, for compiled loops."""
         memory = self.memory
-        motors = measured_motors(robot)
+        motors = measured_motors(robot) if robot.gears else ()
         at = Installation(
             n, period, memory.truth, robot, robot.is_prismatic[:n], motors, settings.fault_seed
         )
@@ -105,9 +105,11 @@ class Plant(RecordOwner):
         if turns:
             self._set_turning(robot, settings.initial_rate_deg_s, positions)
         speeds = memory.x[13 + 2 * robot.joint_count :][:MOST_WHEELS]
-        mount_wheels(settings.wheels, memory.model, memory.environment.friction, speeds)
-        mount_gears(robot, memory.model, memory.environment.friction, memory.x)
-        check_springs(robot, positions, period / settings.substeps, settings.substeps)
+        if settings.wheel_count:
+            mount_wheels(settings.wheels, memory.model, memory.environment.friction, speeds)
+        if robot.gears:
+            mount_gears(robot, memory.model, memory.environment.friction, memory.x)
+            check_springs(robot, positions, period / settings.substeps, settings.substeps)
         self._look_into_blocks()
         # as `write_truth` does for joints at rest, without loading compiled code
         self.truth.quaternion[:] = memory.x[3:7]

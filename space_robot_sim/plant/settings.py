@@ -199,7 +199,8 @@ class PlantNodeSettings(PlantSettings, NodeSettings):
         settings = super().resolve(overrides)
         settings.check_orbit(f"{cls.node} parameters")
         # its numbers in place of its path: bags and nodes need no file
-        return settings.with_table(table_text(settings.disturbance.table))
+        table = settings.disturbance.table
+        return settings.with_table(table_text(table)) if table else settings
 
     def with_table(self, text: str) -> Self:
         """Return the same settings with another table of disturbances, see `DisturbanceTable`."""

@@ -18,7 +18,7 @@ from space_robot_msgs_py.errors import InputError
 from ..analysed_log import AnalysedLog, PointingBudget
 from ..described import event_times
 from ..errors import AxisIndex
-from ..measure import column_label, column_unit
+from ..measure import column_definition, column_label
 from ..plotted import PlottedQuantity, quantities_of
 from ..torques import RippleSpectrum, ripple_spectrum
 from .base_torque import BaseTorque
@@ -173,7 +173,7 @@ def ripple(flights: Mapping[str, FlightCurves]) -> Figure:
                 continue
             shown = np.where(density > 0.0, density, np.nan)
             plot_spectrum(panel, frequency, shown, names.index(name), len(names))
-        squared = "N²" if column_unit(key) == "N" else "(N m)²"
+        squared = "N²" if column_definition(key).unit == "N" else "(N m)²"
         panel.set(xscale="log", yscale="log", ylabel=f"PSD of {column_label(key)} ({squared}/Hz)")
     panels[-1].set_xlabel("frequency (Hz)")
     panels[-1].xaxis.set_major_formatter("{x:g}")

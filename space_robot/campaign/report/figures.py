@@ -27,7 +27,7 @@ from ...analysis.figures.style import (
     page,
     plain,
 )
-from ...analysis.measure import column_label, column_unit
+from ...analysis.measure import column_definition, column_label
 from ..study import short_names
 from ..verdicts.laws import Estimate
 from ..verdicts.rows import GridPoint, has_values, is_complete, law_rows, laws_in, penalised
@@ -186,7 +186,7 @@ def band_figure(
     if not curves:
         return page(12.0, "No flight has a series over time.")
     titles = list(short_names(laws).values()) if per_law else [point.point for point in shown]
-    unit = column_unit(series).strip("-")
+    unit = column_definition(series).unit.strip("-")
     label = f"{column_label(series)} ({unit})" if unit else f"{column_label(series)} error"
     figure, panels = _panels(titles, "time (s)", label)
     for (number, law), values in curves.items():
