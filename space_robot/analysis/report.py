@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     import jinja2
 
 IN_BRIEF = (
-    *("errors", "drift", "navigation", "torques", "roughness", "ripple", "missed_captures"),
+    *("errors", "drift", "navigation", "torques", "roughness", "ripple"),
     *("wheel_saturation", "wheel_reversals", "standing", "beyond_limits", "effort_used"),
 )
 """Groups of metrics that `rms_table`, its remarks and `warnings` show of any flight."""
@@ -76,9 +76,13 @@ def analyze(
 
 
 def _in_brief(flight: AnalysedLog) -> list[str]:
-    has_hardware = flight.log.wheel_velocities.shape[1] or flight.log.thrusts.shape[1]
-    points = flight.pointed_axis is not None
-    return [*IN_BRIEF, *(["sizing"] if has_hardware else []), *(["steadiness"] if points else [])]
+    log = flight.log
+    conditions = {
+        "sizing": log.wheel_velocities.shape[1] or log.thrusts.shape[1],
+        "steadiness": flight.pointed_axis is not None,
+        "missed_captures": "events" in log.flight,
+    }
+    return [*IN_BRIEF, *(name for name, is_shown in conditions.items() if is_shown)]
 
 
 def _flown(flight: AnalysedLog, flight_ticks: int) -> dict[str, Any]:

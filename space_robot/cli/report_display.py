@@ -26,7 +26,8 @@ def show_report(report: dict[str, Any], as_json: bool) -> None:
         echo_json(report)
     else:
         print_table(rms_table(report), console := terminal())
-        if (table := sizing_table(report)) and report["sizing"]["requirements"]:
+        sizing = report["sizing"]
+        if sizing and sizing["requirements"] and (table := sizing_table(report)):
             print_table(table, console)
 
 

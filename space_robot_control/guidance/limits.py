@@ -130,12 +130,11 @@ def _check_motion(robot: Robot, time: Array, joints: Array, base: Array) -> None
 def _check_limits(
     robot: Robot, joint: int, limits: JointLimits, time: Array, motion: Array
 ) -> None:
-    name, (scale, unit) = robot.joint_names[joint], shown_unit(robot, joint)
-    position, rate = motion[:, 0], motion[:, 1]
+    name, position, rate = robot.joint_names[joint], motion[:, 0], motion[:, 1]
     beyond = np.maximum(limits.lower - position, position - limits.upper)
     if beyond.max() > ROUNDING:
         k = int(np.argmax(beyond > ROUNDING))
-        far = int(np.argmax(beyond))
+        far, (scale, unit) = int(np.argmax(beyond)), shown_unit(robot, joint)
         raise InputError(
             f"joint {name!r} leaves its limits at t = {time[k]:.2f} s and comes to "
             f"{position[far] * scale:.6g} {unit}, they are {limits.lower * scale:.6g} to "
@@ -143,6 +142,7 @@ def _check_limits(
         )
     fastest = int(np.argmax(np.abs(rate)))
     if abs(rate[fastest]) > limits.velocity * (1.0 + ROUNDING):
+        scale, unit = shown_unit(robot, joint)
         raise InputError(
             f"joint {name!r} moves at {abs(rate[fastest]) * scale:.4g} {unit}/s at "
             f"t = {time[fastest]:.2f} s, its limit is {limits.velocity * scale:.4g} {unit}/s: "

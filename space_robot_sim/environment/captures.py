@@ -15,7 +15,7 @@ from space_robot_model.robot import Robot
 from space_robot_model.robot.dynamics import generalised_rows
 from space_robot_msgs_py.simulated_time import tick_from
 
-from .events import Capture, Event, in_order
+from .events import Capture, Event
 from .impact import Grasp, Impact
 from .neighbouring_orbit import TargetState, target_state
 from .orbit import OrbitSettings
@@ -72,13 +72,13 @@ class Captures:
     def __init__(
         self, events: Sequence[Event], robot: Robot, period: float, orbit: OrbitSettings
     ) -> None:
-        """Place the events in ticks of ``period`` seconds."""
+        """Place the events, in order of time, in ticks of ``period`` seconds."""
         self._robot = robot
         self.misses: dict[float, float] = {}
         """Distances, m, by tick, of captures that have missed their target."""
         self.exchanges: list[CaptureEvent] = []
         """By their ticks."""
-        for event in in_order(events):
+        for event in events:
             tick = tick_from(event.time_s, period)
             if isinstance(event, Capture):
                 grasp = Grasp.of(robot, event.target)

@@ -8,7 +8,7 @@ text of a `Capture` holds all its numbers.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
@@ -74,16 +74,12 @@ FORMS = {
 
 
 def parse_events(texts: Iterable[str], folder: Path = Path()) -> list[Event]:
-    """Parse events and sort them by time; a target's file may be in ``folder``."""
-    return in_order([_read(text, folder) for text in texts if text.strip()])
-
-
-def in_order(events: Sequence[Event]) -> list[Event]:
-    """Return the events in order of time.
+    """Parse events and sort them by time; a target's file may be in ``folder``.
 
     Raises:
         InputError: capture while a target is held, or release without a target.
     """
+    events = [_read(text, folder) for text in texts if text.strip()]
     # a stable sort: events of one time happen in the user's order
     ordered = sorted(events, key=lambda event: event.time_s)
     held: Capture | None = None

@@ -20,18 +20,17 @@ PROBABILITY = Argument("P", "probability per tick", 0.0, 1.0, default=1.0)
 TICKS = Argument("TICKS", "ticks", 0.0, 1e6, whole=True, default=1.0)
 
 
-def _link_kinds(what: str) -> tuple[Kind, ...]:
-    return (
-        Kind(f"drop_{what}", PROBABILITY, f"a {what} is lost"),
-        Kind(f"repeat_{what}", PROBABILITY, f"a {what} arrives again one tick later"),
-        Kind(f"delay_{what}", TICKS, f"{what}s arrive TICKS late"),
-        Kind(f"jitter_{what}", TICKS, f"{what}s arrive 0 to TICKS late, uniformly distributed"),
-    )
-
-
 MESSAGE_KINDS = by_name(
-    *_link_kinds("state"),
-    *_link_kinds("command"),
+    *(
+        kind
+        for what in ("state", "command")
+        for kind in (
+            Kind(f"drop_{what}", PROBABILITY, f"a {what} is lost"),
+            Kind(f"repeat_{what}", PROBABILITY, f"a {what} arrives again one tick later"),
+            Kind(f"delay_{what}", TICKS, f"{what}s arrive TICKS late"),
+            Kind(f"jitter_{what}", TICKS, f"{what}s arrive 0 to TICKS late, uniformly distributed"),
+        )
+    ),
     Kind("nan_state", PROBABILITY, "one measured number is NaN"),
     Kind("inf_state", PROBABILITY, "one measured number is infinite"),
     Kind("scaled_quaternion", PROBABILITY, "the measured quaternion's norm is 0.9 or 1.1"),

@@ -253,7 +253,7 @@ def test_a_release_leaves_the_momenta_and_gives_the_spring_s_speed(
 def test_robots_follow_one_another_and_the_bare_one_comes_back_exactly() -> None:
     robot = random_robot(np.random.default_rng(2), 3)
     target = Target.from_dict({"target": BODY})
-    events = [Capture(3.0, target), Release(2.0), Capture(1.0, target)]
+    events = [Capture(1.0, target), Release(2.0), Capture(3.0, target)]
     captures = Captures(events, robot, 5e-4, OrbitSettings())
     bare = float(robot.mass[-1])
     for tick, held in ((1999, 0.0), (2000, 2.0), (3999, 2.0), (4000, 0.0), (6000, 2.0)):
