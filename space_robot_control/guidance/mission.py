@@ -113,7 +113,7 @@ class MissionNodeSettings(MissionSettings, NodeSettings):
         """Read a parameter file, a mission's document, or a trajectory."""
         layer = mission_layer(path, cls.node, selected["robot"])
         if texts := layer.get("segments"):
-            layer["segments"] = [with_columns(text, path.parent) for text in texts]
+            layer["segments"] = [with_columns(t, path.parent) if "file" in t else t for t in texts]
         return layer
 
 
