@@ -295,36 +295,24 @@ class RobotState(StateSignals):
 class Reference(Record):
     """The desired motion at a tick, laid out as the two parts of a `ReferenceChunk`'s row."""
 
-    joint_positions: Array = (
-        signal(Reporter.OTHERS, JOINTS, "rad", "", "desired positions of the joints with motors")
-        .within("reference_joints")
-        .sent(topics.REFERENCE_JOINTS, "positions")
-    )
-    joint_velocities: Array = (
-        signal(Reporter.OTHERS, JOINTS, "rad/s", "", "desired velocities")
-        .within("reference_joints")
-        .sent(topics.REFERENCE_JOINTS, "velocities")
-    )
-    joint_accelerations: Array = (
-        signal(Reporter.OTHERS, JOINTS, "rad/s2", "", "desired accelerations")
-        .within("reference_joints")
-        .sent(topics.REFERENCE_JOINTS, "accelerations")
-    )
-    quaternion: Array = (
-        signal(Reporter.OTHERS, 4, "", "from base to inertial axes", "attitude [w, x, y, z]")
-        .within("reference_base")
-        .sent(topics.REFERENCE_BASE, "transforms[0].rotation")
-    )
-    omega_base: Array = (
-        signal(Reporter.OTHERS, 3, "rad/s", BASE, "desired angular velocity of the base")
-        .within("reference_base")
-        .sent(topics.REFERENCE_BASE, "velocities[0].angular")
-    )
-    alpha_base: Array = (
-        signal(Reporter.OTHERS, 3, "rad/s2", BASE, "desired angular acceleration of the base")
-        .within("reference_base")
-        .sent(topics.REFERENCE_BASE, "accelerations[0].angular")
-    )
+    joint_positions: Array = signal(
+        Reporter.OTHERS, JOINTS, "rad", "", "desired positions of the joints with motors"
+    ).sent(topics.REFERENCE_JOINTS, "positions", column="reference_joints")
+    joint_velocities: Array = signal(
+        Reporter.OTHERS, JOINTS, "rad/s", "", "desired velocities"
+    ).sent(topics.REFERENCE_JOINTS, "velocities", column="reference_joints")
+    joint_accelerations: Array = signal(
+        Reporter.OTHERS, JOINTS, "rad/s2", "", "desired accelerations"
+    ).sent(topics.REFERENCE_JOINTS, "accelerations", column="reference_joints")
+    quaternion: Array = signal(
+        Reporter.OTHERS, 4, "", "from base to inertial axes", "attitude [w, x, y, z]"
+    ).sent(topics.REFERENCE_BASE, "transforms[0].rotation", column="reference_base")
+    omega_base: Array = signal(
+        Reporter.OTHERS, 3, "rad/s", BASE, "desired angular velocity of the base"
+    ).sent(topics.REFERENCE_BASE, "velocities[0].angular", column="reference_base")
+    alpha_base: Array = signal(
+        Reporter.OTHERS, 3, "rad/s2", BASE, "desired angular acceleration of the base"
+    ).sent(topics.REFERENCE_BASE, "accelerations[0].angular", column="reference_base")
 
     @staticmethod
     def parts(references: Block) -> tuple[Array, Array]:

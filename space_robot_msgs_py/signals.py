@@ -62,17 +62,16 @@ class Signal(Field):
     column: str = ""
     """Column of a log that has it behind others; empty: the column of its own name."""
 
-    def sent(self, topic: Topic, path: str, first: int = 0, length: int | None = None) -> Signal:
-        """Return the declaration with a `MessageField` that carries it."""
-        return replace(self, fields=(*self.fields, MessageField(topic, path, first, length)))
+    def sent(
+        self, topic: Topic, path: str, first: int = 0, length: int | None = None, column: str = ""
+    ) -> Signal:
+        """Return the declaration with a `MessageField` that carries it, and its `column`."""
+        fields = (*self.fields, MessageField(topic, path, first, length))
+        return replace(self, fields=fields, column=column or self.column)
 
     def named(self, *names: str) -> Signal:
         """Return the declaration with `labels`: of each name x, y, and z."""
         return replace(self, labels=tuple(f"{name}_{axis}" for name in names for axis in "xyz"))
-
-    def within(self, column: str) -> Signal:
-        """Return the declaration with the `column` that has it behind others."""
-        return replace(self, column=column)
 
     def width(self, names: Any) -> int:
         """Return how many numbers a robot with these `RobotNames` has in a message."""
