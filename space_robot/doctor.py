@@ -15,13 +15,14 @@ import tempfile
 import time
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from importlib import import_module
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any, Literal, NamedTuple
 
 from space_robot_msgs_py.config.installation import install_packages, requirements
 from space_robot_msgs_py.config.text import one_line_of
 from space_robot_msgs_py.errors import SpaceRobotError
+
+from .processes.software import installed_version
 
 Status = Literal["ok", "warning", "missing"]
 
@@ -136,16 +137,9 @@ def check_packages(required: Mapping[str, list[str]]) -> Iterator[CheckedItem]:
 def _installed(packages: Sequence[str]) -> tuple[dict[str, str | None], list[str]]:
     """Return the version of each required package by name, and the requirements not installed."""
     names = [re.split(r"[^\w.-]", requirement, maxsplit=1)[0] for requirement in packages]
-    versions = {name: _version(name) for name in names}
+    versions = {name: installed_version(name) for name in names}
     lacking = [text for text, name in zip(packages, names, strict=True) if not versions[name]]
     return versions, lacking
-
-
-def _version(package: str) -> str | None:
-    try:
-        return version(package)
-    except PackageNotFoundError:
-        return None
 
 
 def check_flights() -> CheckedItem:
@@ -294,7 +288,7 @@ def check_distribution(file: str, environment: Mapping[str, str]) -> CheckedItem
     """Check which ROS 2 the rclpy of a file belongs to, by ``ROS_DISTRO`` of ``setup.bash``."""
     from .flight.graph.processes import has_ros2_run
 
-    wheel = _version(WHEEL)
+    wheel = installed_version(WHEEL)
     distribution = environment.get("ROS_DISTRO") or (DISTRIBUTION if wheel else "unknown")
     origin = f"wheel {WHEEL} {wheel}" if wheel else "no wheel"
     starts = "`ros2 run`" if has_ros2_run() else "Python"

@@ -172,8 +172,12 @@ class _Worker:
 
     def submit(self, function: Callable[[Any], Any], item: Any) -> Future[Any]:
         if self._process is None:
-            with _without_main():
-                ready = self._executor.submit(_load, function)
+            main = sys.modules["__main__"]  # which a new worker would run again
+            sys.modules["__main__"] = type(sys)("__main__")
+            try:
+                ready = self._executor.submit(callable, function)  # imports the function's module
+            finally:
+                sys.modules["__main__"] = main
             (self._process,) = self._executor._processes.values()
             # else a worker that is killed while it writes leaves a reader that waits for ever
             self._executor._result_queue._writer.close()  # type: ignore[attr-defined]
@@ -220,17 +224,6 @@ def _forget_fork_server() -> None:
 os.register_at_fork(after_in_child=_forget_fork_server)
 
 
-@contextmanager
-def _without_main() -> Iterator[None]:
-    """Hide the main module, which a new worker would run again; nothing of it is needed there."""
-    main = sys.modules["__main__"]
-    sys.modules["__main__"] = type(sys)("__main__")
-    try:
-        yield
-    finally:
-        sys.modules["__main__"] = main
-
-
 def _begin_worker() -> None:
     for number in (signal.SIGINT, signal.SIGHUP, signal.SIGQUIT):  # only the parent handles them
         signal.signal(number, signal.SIG_IGN)
@@ -238,10 +231,6 @@ def _begin_worker() -> None:
     # to search everything that the modules hold for cycles costs a tenth of the time
     gc.freeze()
     gc.set_threshold(COLLECTED_AT)
-
-
-def _load(function: Callable[[Any], Any]) -> None:
-    """Import the module of a function, by being called with it."""
 
 
 def _end_with_parent() -> None:
@@ -265,41 +254,33 @@ def _in_processes(
                 return
             oldest = min(worker.since for worker in busy.values())
             left = None if timeout_s is None else max(0.0, oldest + timeout_s - time.monotonic())
-            over = wait(busy, left, FIRST_COMPLETED).done
-            for future in over:
+            for future in wait(busy, left, FIRST_COMPLETED).done:
                 worker, error = busy.pop(future), future.exception()
                 if isinstance(error, BrokenProcessPool):
                     worker.kill()
                     yield Done(worker.item, None, WorkerDiedError("its process died"))
                     continue
                 idle.append(worker)
-                if error is None:
-                    yield Done(worker.item, future.result())
-                else:
-                    yield Done(worker.item, None, as_exception(error))
+                result = future.result() if error is None else None
+                yield Done(worker.item, result, error and as_exception(error))
             for future in [] if timeout_s is None else list(busy):
                 if busy[future].since + cast(float, timeout_s) <= time.monotonic():
                     worker = busy.pop(future)
                     worker.kill()
-                    text = f"not over after {timeout_s:g} s"
-                    yield Done(worker.item, None, OutOfTimeError(text))
+                    late = OutOfTimeError(f"not over after {timeout_s:g} s")
+                    yield Done(worker.item, None, late)
     finally:
         for worker in (*idle, *busy.values()):
             worker.kill()
-
-
-def check_scheduler(address: str) -> None:
-    """Check that a scheduler answers at an address; else raise `InputError`."""
-    with _connected(address):
-        pass
 
 
 def _on_cluster(
     address: str, function: Callable[[Any], Any], items: Iterable[Any], timeout_s: float | None
 ) -> Generator[Done[Any, Any], None, None]:
     rest, in_progress = iter(items), dict[Future[Any], Any]()
+    lost = ClusterError(f"scheduler {address}: the connection to it is lost")
     task = _ClusterTask(function, timeout_s, versions())
-    with _connected(address) as client:
+    with connected(address) as client:
         from distributed import KilledWorker
 
         executor = client.get_executor(pure=False)
@@ -309,7 +290,7 @@ def _on_cluster(
                 try:
                     threads = sum(client.nthreads().values())
                 except (OSError, TimeoutError, RuntimeError, ValueError):
-                    raise _connection_lost(address) from None
+                    raise lost from None
                 seen = time.monotonic() if threads else seen
                 if time.monotonic() > seen + WORKERS_S:
                     raise ClusterError(f"scheduler {address}: no worker for {WORKERS_S:g} s")
@@ -326,20 +307,15 @@ def _on_cluster(
                         yield Done(item, None, WorkerDiedError("its Dask worker died"))
                         continue
                     except CancelledError:
-                        raise _connection_lost(address) from None
-                    except SpaceRobotError as failure:
-                        raise ClusterError(f"scheduler {address}: {failure}") from failure
+                        raise lost from None
                     except Exception as failure:
-                        text = f"{type(failure).__name__}: {one_line_of(failure)}"
+                        is_own = isinstance(failure, SpaceRobotError)
+                        text = str(failure) if is_own else one_line_of(failure)
                         raise ClusterError(f"scheduler {address}: {text}") from failure
                     yield Done(item, result, error)
         finally:
             if client.status == "running":
                 executor.shutdown(wait=False)
-
-
-def _connection_lost(address: str) -> ClusterError:
-    return ClusterError(f"scheduler {address}: the connection to it is lost")
 
 
 class _TimeIsUpError(BaseException):
@@ -356,11 +332,9 @@ class _ClusterTask:
     versions: dict[str, str | None]
 
     def __call__(self, item: Any) -> tuple[Any, Exception | None]:
-        here = versions()
-        for name, version in self.versions.items():
-            if here.get(name) != version:
-                text = f"{name} is {here.get(name)} on a worker, {version} here"
-                raise SpaceRobotError(text)
+        for name, here in versions().items():
+            if here != (there := self.versions.get(name)):
+                raise SpaceRobotError(f"{name} is {here} on a worker, {there} here")
         with _one_at_a_time:
             try:
                 with _interrupted_after(self.timeout_s):
@@ -389,7 +363,8 @@ def _interrupted_after(timeout_s: float | None) -> Iterator[None]:
 
 
 @contextmanager
-def _connected(address: str) -> Iterator[Client]:
+def connected(address: str) -> Iterator[Client]:
+    """Connect to a scheduler; InputError: none answers at the address."""
     try:
         from distributed import Client
     except ImportError:
@@ -401,8 +376,7 @@ def _connected(address: str) -> Iterator[Client]:
         except (OSError, TimeoutError, ValueError, RuntimeError, TypeError) as error:
             failure = " ".join(str(error).split())
         if client is None:
-            # a client that has failed closes itself when it is collected: now, for where Dask
-            # holds its lock of event loops that would wait for ever
+            # a failed client closes itself when it is collected: later that might wait for ever
             gc.collect()
             raise InputError(f"scheduler {address!r}: {failure}")
         try:

@@ -23,7 +23,7 @@ from space_robot_msgs_py.errors import InputError
 
 from ...analysis.own_metric import SESSION, MetricFunction, check_names, text_of
 from ...console.progress import check_progress, rated_progress
-from ...processes.executor import check_scheduler, cores, is_daemonic, start_fork_server
+from ...processes.executor import connected, cores, is_daemonic, start_fork_server
 from ...processes.scratch_folder import ScratchFolder
 from ..study import Study, read_study
 from .flights import Flights, Progress, fly_bags
@@ -146,7 +146,8 @@ class Campaign:
         folder = Path(temporary.name) if temporary else as_path(out, "out")
         if not (folder / DATABASE).exists():  # before the folder is created
             if scheduler is not None:
-                check_scheduler(scheduler)
+                with connected(scheduler):
+                    pass
             if self.study.metrics:
                 prepared.compile(is_in_lanes=timeout_s is None)
                 prepared.try_metrics(processes, timeout_s if processes else None)
