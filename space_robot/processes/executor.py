@@ -262,7 +262,7 @@ def _in_processes(
                     continue
                 idle.append(worker)
                 result = future.result() if error is None else None
-                yield Done(worker.item, result, error and as_exception(error))
+                yield Done(worker.item, result, as_exception(error) if error else None)
             for future in [] if timeout_s is None else list(busy):
                 if busy[future].since + cast(float, timeout_s) <= time.monotonic():
                     worker = busy.pop(future)
