@@ -18,7 +18,7 @@ import matplotlib as mpl
 import numpy as np
 
 from space_robot import Scenario, fly_many
-from space_robot.analysis.words import of_statistic
+from space_robot.analysis.words import with_statistic
 from space_robot.campaign.gain_set import tuned_set
 from space_robot.tuning.method import Tuned, TuningOptions
 
@@ -132,7 +132,7 @@ def flown(count: int) -> Iterator[Arm]:
         scenarios, sets = made(number)
         errors = {}
         for kind, flight in zip(KINDS, fly_many(scenarios), strict=True):
-            rms = of_statistic(flight.metrics, "rms")
+            rms = with_statistic(flight.metrics, "rms")
             own = [rms[key] for key in rms if key == "attitude" or key.startswith("joints")]
             errors[kind] = max(own) if flight.ending.outcome == "complete" else np.inf
         robot = scenarios[0].robot["robot"]

@@ -166,8 +166,8 @@ def main() -> None:
     setproctitle("space_robot: server of the nodes")
     servers = [forked_server(run_program)]  # all that a node needs is loaded
     setproctitle("space-robot")
-    begun_anew = ForkServer.of_module
-    ForkServer.of_module = lambda module: servers.pop() if servers else begun_anew(module)  # type: ignore[method-assign,assignment]
+    begun_anew = ForkServer.as_program
+    ForkServer.as_program = lambda module: servers.pop() if servers else begun_anew(module)  # type: ignore[method-assign,assignment]
     server = servers[0]
     del sys.argv[0]
     try:

@@ -7,10 +7,10 @@ from collections.abc import Callable
 import numpy as np
 
 from space_robot.analysis import analyze
-from space_robot.analysis.described import robot_of
+from space_robot.analysis.described import flown_robot
 from space_robot.analysis.errors import tracking_error
 from space_robot.analysis.sizing import ActuatorSet
-from space_robot.analysis.words import of_statistic
+from space_robot.analysis.words import with_statistic
 from space_robot.api.flown_flight import FlownFlight
 from space_robot_control.allocation.settings import assumed_actuators
 
@@ -60,7 +60,7 @@ def attitude_error_at(time: float) -> Callable[[FlownFlight], float]:
 
 def first_at_limit(flown: FlownFlight) -> float:
     """Return the time at which a wheel was first at a limit, s."""
-    return min(of_statistic(flown.metrics, "first_limit").values())
+    return min(with_statistic(flown.metrics, "first_limit").values())
 
 
 def largest_base_torque(flown: FlownFlight) -> float:
@@ -72,7 +72,7 @@ def asked_of_a_wheel(quantity: str) -> Callable[[FlownFlight], float]:
     """Return the most that the flight asks of one of the wheels of `wheels`."""
 
     def asked(flown: FlownFlight) -> float:
-        wheels = ActuatorSet("wheels", assumed_actuators("wheels", robot_of(flown.log)))
+        wheels = ActuatorSet("wheels", assumed_actuators("wheels", flown_robot(flown.log)))
         requirements = analyze(flown.log, wheels)["sizing"]["requirements"]
         of_wheels = [r for r in requirements if r["part"].startswith("wheel_")]
         return float(max(r["asked"] for r in of_wheels if r["quantity"] == quantity))

@@ -6,7 +6,7 @@ from typing import Any
 
 from flown_tables import Number, Options, Page, Table
 
-from space_robot.analysis.words import of_statistic
+from space_robot.analysis.words import with_statistic
 from space_robot.api.flown_flight import FlownFlight
 
 ROBOTS = ("paper", "seven_joint", "dual_arm", "ets_vii", "canadarm", "canadarm2")
@@ -23,7 +23,7 @@ def largest_rms(flown: FlownFlight) -> float | None:
     """Return the largest RMS error of attitude and joints; None if the flight diverged."""
     if flown.ending.outcome != "complete":
         return None
-    errors = of_statistic(flown.metrics, "rms")
+    errors = with_statistic(flown.metrics, "rms")
     own = [errors[key] for key in errors if key == "attitude" or key.startswith("joints")]
     return float(f"{max(own):.6g}")
 

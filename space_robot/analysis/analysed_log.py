@@ -106,7 +106,7 @@ class AnalysedLog:
     def pointed_axis(self) -> Array | None:
         """(3,) the axis that the mission points; None: it points none, or is not known."""
         with suppress(InputError):
-            mission = described.settings_of(self.log).mission
+            mission = described.flown_settings(self.log).mission
             return pointed_axis(mission.written_segments, mission.base_point)
         return None
 
@@ -150,8 +150,8 @@ class AnalysedLog:
 
     @cached_property
     def robot(self) -> Robot:
-        """The robot that was flown, see `described.robot_of`."""
-        return described.robot_of(self.log)
+        """The robot that was flown, see `described.flown_robot`."""
+        return described.flown_robot(self.log)
 
     @cached_property
     def actuators(self) -> BaseActuatorSettings:

@@ -61,7 +61,7 @@ class TorqueLimits(NamedTuple):
 NO_LIMITS = TorqueLimits(np.inf, np.inf)
 
 
-def start_step_of(log: FlightLog) -> dict[str, Any] | None:
+def recorded_start_step(log: FlightLog) -> dict[str, Any] | None:
     """Return the `StartStep` that the flight began with; None: none is described."""
     step, zero = log.flight.get("start_step"), StartStep()._asdict()
     if not isinstance(step, dict):
@@ -70,7 +70,7 @@ def start_step_of(log: FlightLog) -> dict[str, Any] | None:
     return known if [*map(type, known.values())] == [*map(type, zero.values())] else None
 
 
-def settings_of(log: FlightLog) -> FlightSettings:
+def flown_settings(log: FlightLog) -> FlightSettings:
     """Return the settings of the flight's nodes, with its robots."""
     if log.scenario is not None:
         settings: FlightSettings = log.scenario
@@ -89,18 +89,18 @@ def _resolved(description: str, trusted: bool) -> FlightSettings:
     return FlightSettings.resolve(recorded_scenario(options, trusted))
 
 
-def robot_of(log: FlightLog) -> Robot:
+def flown_robot(log: FlightLog) -> Robot:
     """Return the robot that was flown."""
     if log.scenario is None and "robot" not in recorded_options(log.flight):
         raise NotDescribedError("the bag does not say which robot was flown")
-    robot = settings_of(log).robots.plant
+    robot = flown_settings(log).robots.plant
     check_joints(robot, log)
     return robot
 
 
 def plant_settings(log: FlightLog) -> PlantNodeSettings:
     """Return what the plant was told: its environment, orbit, actuators and limits."""
-    return settings_of(log).plant
+    return flown_settings(log).plant
 
 
 def check_joints(robot: Robot, log: FlightLog) -> None:
@@ -121,16 +121,16 @@ def torque_limits(log: FlightLog) -> TorqueLimits:
     return TorqueLimits(settings.base_torque_limit or np.inf, settings.joint_torque_limit or np.inf)
 
 
-def captures_of(log: FlightLog) -> Captures:
+def flown_captures(log: FlightLog) -> Captures:
     """Return the captures and releases of the robot that flew, from the first rows ``log`` on."""
     settings = plant_settings(log)
-    robot = with_payload(robot_of(log), settings.payload)
+    robot = with_payload(flown_robot(log), settings.payload)
     if robot.geared_names != log.geared_names:
         raise NotDescribedError(
             f"robot {robot.name!r} has gears in the joints {_listed(robot.geared_names)}, the bag "
             f"has motors of {_listed(log.geared_names)}"
         )
-    captures = Captures(events_of(log), robot, log.timebase.period, settings)
+    captures = Captures(flown_events(log), robot, log.timebase.period, settings)
     for exchange in captures.exchanges:
         if exchange.target_state and exchange.tick < log.first_tick:
             raise NotDescribedError(
@@ -140,7 +140,7 @@ def captures_of(log: FlightLog) -> Captures:
     return captures
 
 
-def events_of(log: FlightLog) -> list[Event]:
+def flown_events(log: FlightLog) -> list[Event]:
     """Return the captures and releases, by time."""
     return plant_settings(log).parsed_events
 
@@ -148,7 +148,7 @@ def events_of(log: FlightLog) -> list[Event]:
 def event_labels(log: FlightLog) -> list[str]:
     """Say in a few words each what was captured and released; as the bag has it if it cannot be."""
     try:
-        return [event.label for event in events_of(log)]
+        return [event.label for event in flown_events(log)]
     except InputError:
         return [short(str(text)) for text in log.flight.get("events", ())]
 
@@ -156,7 +156,7 @@ def event_labels(log: FlightLog) -> list[str]:
 def event_times(log: FlightLog) -> Array:
     """Return the times of the flight's events within ``log``, s; none if they are not known."""
     try:
-        ticks = np.array([tick_from(e.time_s, log.timebase.period) for e in events_of(log)])
+        ticks = np.array([tick_from(e.time_s, log.timebase.period) for e in flown_events(log)])
     except InputError:
         ticks = np.empty(0)
     inside = (log.first_tick <= ticks) & (ticks < log.first_tick + log.ticks)
@@ -164,28 +164,16 @@ def event_times(log: FlightLog) -> Array:
     return times
 
 
-def sensors_of(log: FlightLog) -> str:
-    """Return the name of the sensors, as far as the bag records it."""
-    return str(log.flight.get("sensors") or IDEAL)
-
-
-def navigation_of(log: FlightLog) -> str:
-    """Return the name of the navigation, as far as the bag records it."""
-    if log.scenario is not None:
-        return str(log.scenario.controller.navigation)
-    return str(log.flight.get("navigation") or DIRECT)
-
-
-def actuators_of(log: FlightLog) -> str:
-    """Return the name of the base's actuators, as far as the bag records it."""
-    return str(log.flight.get("actuators") or IDEAL)
+def flown_name(log: FlightLog, kind: str) -> str:
+    """Return the name of the sensors, the navigation or the actuators, as far as it is recorded."""
+    return str(log.flight.get(kind) or (DIRECT if kind == "navigation" else IDEAL))
 
 
 def flown_actuators(log: FlightLog) -> BaseActuatorSettings:
     """Return the base's actuators, which fit the robot and the columns of the flight."""
     actuators = plant_settings(log)
     if actuators.base_actuation == "hardware":
-        actuators.check(robot_of(log), "of the bag")
+        actuators.check(flown_robot(log), "of the bag")
     counts = log.wheel_velocities.shape[1], log.thrusts.shape[1]
     if counts != (actuators.wheel_count, actuators.thruster_count):
         raise NotDescribedError(

@@ -115,7 +115,7 @@ def attitude_angles(log: FlightLog) -> Array:
     return angles
 
 
-def quaternions_of(eps: Array) -> Array:
+def unit_quaternions(eps: Array) -> Array:
     """Return the unit quaternions (N, 4) with the vector parts (N, 3), and eta >= 0."""
     return np.hstack([np.sqrt(np.maximum(1.0 - dot_rows(eps, eps), 0.0)), eps])
 

@@ -22,7 +22,7 @@ from space_robot_msgs_py.bag.law_history import laws_of
 from space_robot_msgs_py.errors import InputError
 
 from .analysed_log import AnalysedLog
-from .described import DIRECT, NotDescribedError, navigation_of, settings_of
+from .described import DIRECT, NotDescribedError, flown_name, flown_settings
 from .errors import applied_force, continuous_error, mean_acceleration, measured_rows
 from .series import Definition, TimeSeries, series
 
@@ -48,11 +48,11 @@ def estimate_error(flight: AnalysedLog) -> TimeSeries:
     """Return the error of the time-delay estimate of the laws in force."""
     log = flight.log
     axes = {f"estimate_error_{name}": index for name, index in flight.groups.items()}
-    values = errors_of(log, recorded_h_bar, smoothing_of(log), rest=log.first_tick == 0)
+    values = estimate_errors(log, recorded_h_bar, law_smoothing(log), rest=log.first_tick == 0)
     return TimeSeries(axes, values, _unknown(log))
 
 
-def errors_of(
+def estimate_errors(
     log: FlightLog, h_bar: HBar, smoothing: float = 0.0, rest: bool = True
 ) -> Callable[[int, int], Array]:
     """Return a function from rows, in order, to ``N - N_hat`` (stop - start, m).
@@ -77,8 +77,8 @@ def errors_of(
         true = _pairs(rows)
         as_reported = true if reported is log else _pairs(reported.rows(first, last))
         estimates = low_pass.of(first, as_reported)
-        of_laws = h_bar(rows)
-        own = of_laws[1:-1] if of_laws.ndim == 2 else of_laws
+        law_h_bar = h_bar(rows)
+        own = law_h_bar[1:-1] if law_h_bar.ndim == 2 else law_h_bar
         # force and acceleration outlast a change of law or gains, their h_bar does not
         estimate = estimates[:-1, 0] - own * estimates[:-1, 1]
         error = true[1:, 0] - own * true[1:, 1] - estimate
@@ -98,7 +98,7 @@ class PairFilter:
     """``N_hat`` as the controller forms it of force and acceleration, interval after interval.
 
     It is linear, so that it may be formed of both before h_bar is known. Arguments as in
-    `errors_of`.
+    `estimate_errors`.
     """
 
     def __init__(self, smoothing: float = 0.0, rest: bool = True) -> None:
@@ -146,14 +146,14 @@ def _unknown(log: FlightLog) -> str:
     return "three measured states in a row are needed"
 
 
-def smoothing_of(log: FlightLog) -> float:
+def law_smoothing(log: FlightLog) -> float:
     """Return the weight of a new pair in the low-pass of the laws' time-delay estimate; 0: none."""
-    if navigation_of(log) != DIRECT:
+    if flown_name(log, "navigation") != DIRECT:
         raise InputError("the filtered states that N_hat is formed of are not recorded")
     if not log.laws:
         raise InputError("the laws in force were not recorded")
     with suppress(NotDescribedError):
-        filter_hz = settings_of(log).controller.acceleration_filter_hz
+        filter_hz = flown_settings(log).controller.acceleration_filter_hz
         return low_pass_weight(filter_hz, log.timebase.period)
     return 0.0
 

@@ -18,7 +18,7 @@ from space_robot_sim.environment.captures import Captures
 from space_robot_sim.environment.disturbance import DisturbanceSettings, LoadSchedule
 
 from .analysed_log import AnalysedLog
-from .described import captures_of, plant_settings
+from .described import flown_captures, plant_settings
 from .series import Definition, TimeSeries, series
 
 Array = NDArray[np.float64]
@@ -68,7 +68,7 @@ def torques_by_source(log: FlightLog) -> dict[str, Callable[[int, int], Array]]:
     Inertial axes, about the common centre of mass, over the interval after the tick.
     """
     settings = plant_settings(log).disturbance
-    captures = captures_of(log) if settings.table else None
+    captures = flown_captures(log) if settings.table else None
     torques: dict[str, Callable[[int, int], Array]] = {}
     for k, name in enumerate(SOURCES):
         torques[name] = lambda a, b, k=k: log.external_torques[a:b, 3 * k : 3 * k + 3]  # type: ignore[misc]
@@ -95,7 +95,7 @@ def base_loads(log: FlightLog, disturbance: DisturbanceSettings) -> tuple[Array,
     return begin[:, :6], end[:, :6]
 
 
-def axes_of(log: FlightLog) -> Array:
+def body_axes(log: FlightLog) -> Array:
     """Return the base's axes on inertial ones, (3, 3, N), see `base_axes`."""
     return base_axes(unit_rows(log.quaternion).T)
 
@@ -120,7 +120,7 @@ def _own_torque(log: FlightLog, disturbance: DisturbanceSettings, captures: Capt
     for begin, end in pairwise(ticks):  # between captures and releases the robot is the same
         rows = log.rows(begin - log.first_tick, end - log.first_tick)
         centres.append(centre_of_mass(captures.robot_at(begin), rows))
-    return torque_about_centre(axes_of(log), np.concatenate(centres), loads[:, :3], loads[:, 3:])
+    return torque_about_centre(body_axes(log), np.concatenate(centres), loads[:, :3], loads[:, 3:])
 
 
 def centre_of_mass(robot: Robot, log: FlightLog) -> Array:

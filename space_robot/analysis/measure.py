@@ -103,7 +103,7 @@ def evaluate(
         return {}, {}
     numbers: dict[str, float] = {}
     unavailable: dict[str, str] = {}
-    for group in _groups_of(wanted, groups):
+    for group in _wanted_groups(wanted, groups):
         try:
             numbers |= group.evaluate(flight, rows)
         except InputError as error:
@@ -113,12 +113,14 @@ def evaluate(
     return numbers, unavailable
 
 
-def _groups_of(wanted: Collection[str] | None, groups: Container[str]) -> Collection[MetricGroup]:
+def _wanted_groups(
+    wanted: Collection[str] | None, groups: Container[str]
+) -> Collection[MetricGroup]:
     if wanted is None:
         return [group for name, group in GROUPS.items() if name in groups]
     chosen = {}
     for name in wanted:
-        if (group := group_of(name)) is None:
+        if (group := metric_group(name)) is None:
             one_of(name, [template for _, template, _ in all_metrics()], "metric")
         else:
             chosen[group.name] = group
@@ -153,7 +155,7 @@ def _registered(name: str) -> tuple[MetricGroup | None, Definition]:
     return None, Definition("", "")
 
 
-def group_of(name: str) -> MetricGroup | None:
+def metric_group(name: str) -> MetricGroup | None:
     """Return the group of a metric; None: there is none, as of a user's own."""
     return _registered(name)[0]
 

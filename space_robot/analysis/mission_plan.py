@@ -247,22 +247,22 @@ def stretched_mission(
 
 
 def lightened_mission(
-    robot: Robot, mission: Mission, settings: MissionSettings, of_torque: bool
+    robot: Robot, mission: Mission, settings: MissionSettings, by_torque: bool
 ) -> MissionSettings:
     """Return a mission that asks less of the base in the same time.
 
     Legs of the joints get the bends of `best_bends`, tools are led with ``least: momentum``.
-    ``robot`` is as the flight software knows it; ``of_torque``: whether the largest torque is to
+    ``robot`` is as the flight software knows it; ``by_torque``: whether the largest torque is to
     fall, else the largest momentum.
     """
     segments = []
     for text, piece in zip(settings.written_segments, mission.pieces, strict=True):
-        segments.append(json.dumps(_lightened(robot, piece, parse_yaml(text), of_torque)))
+        segments.append(json.dumps(_lightened(robot, piece, parse_yaml(text), by_torque)))
     return settings.model_copy(update={"segments": segments})
 
 
 def _lightened(
-    robot: Robot, piece: Piece, content: dict[str, Any], of_torque: bool
+    robot: Robot, piece: Piece, content: dict[str, Any], by_torque: bool
 ) -> dict[str, Any]:
     if content.get("base") == "free":
         return content
@@ -271,7 +271,7 @@ def _lightened(
     if not isinstance(piece.joints, QuinticLeg) or "joints_deg" not in content:
         return content
     leg = BentLeg(*piece.joints, np.zeros((0, robot.n)))
-    bends, share = best_bends(robot, leg, piece.base, of_torque)
+    bends, share = best_bends(robot, leg, piece.base, by_torque)
     bent = leg._replace(bends=np.array([robot.from_degrees(bend) for bend in bends]))
     try:
         check_piece(robot, piece._replace(joints=bent))
@@ -302,11 +302,11 @@ def mission_text(settings: MissionSettings) -> str:
 
 
 def best_bends(
-    robot: Robot, leg: BentLeg, base: Course, of_torque: bool
+    robot: Robot, leg: BentLeg, base: Course, by_torque: bool
 ) -> tuple[list[list[float]], float]:
     """Return bends in degrees (m for prismatic joints), and what is left of the demand, as a share.
 
-    The leg's own bends do not count; ``base``: course of the base during the leg; ``of_torque`` as
+    The leg's own bends do not count; ``base``: course of the base during the leg; ``by_torque`` as
     in `lightened_mission`.
     """
     from scipy.optimize import minimize  # slow to import
@@ -317,7 +317,7 @@ def best_bends(
         course = leg._replace(bends=bends.reshape(shape))
         end = leg.begin + leg.span
         sampled = demand(robot.nominal, course, base, leg.begin, end, samples)
-        return sampled.base_torque if of_torque else sampled.stored_momentum
+        return sampled.base_torque if by_torque else sampled.stored_momentum
 
     scale = float(asked(np.zeros(shape)).max())
     if scale == 0.0:

@@ -31,8 +31,8 @@ from space_robot_sim.environment.events import Capture
 from space_robot_sim.environment.impact import Impact
 
 from .analysed_log import AnalysedLog
-from .described import NotDescribedError, captures_of, events_of, plant_settings
-from .external_torques import axes_of, base_loads, torque_about_centre
+from .described import NotDescribedError, flown_captures, flown_events, plant_settings
+from .external_torques import base_loads, body_axes, torque_about_centre
 from .series import Definition, TimeSeries, metrics, series
 
 Array = NDArray[np.float64]
@@ -83,7 +83,7 @@ class MomentumSeries:
         if settings.has_orbit and not flight.log.external_torques.shape[1]:
             raise NotDescribedError("the torques that acted in the orbit were not recorded")
         self._log, self.flown = flight.log, flight.actuators
-        self._captures, self._disturbance = captures_of(flight.log), settings.disturbance
+        self._captures, self._disturbance = flown_captures(flight.log), settings.disturbance
         self._robot = self._captures.robot_at(flight.log.first_tick)
         self._outside = np.zeros(3)
 
@@ -131,7 +131,7 @@ class MomentumSeries:
 
     def _momentum(self, robot: Robot, rows: FlightLog, outside: Array) -> Momentum:
         """Return the momentum of rows; ``outside``: (3,) what had come by the first."""
-        axes = axes_of(rows)
+        axes = body_axes(rows)
         motion = Motion(
             unit_rows(rows.quaternion), rows.omega_base, rows.all_positions, rows.all_velocities
         )
@@ -166,8 +166,8 @@ class MomentumSeries:
             force = product(rows.thrusts, thrusters.unit_directions)
             about = product(rows.thrusts, np.cross(thrusters.places, thrusters.unit_directions))
             if flown.torquer_count:  # all on the base that is not of the wheels' motors
-                of_wheels = product(rows.wheel_torques, flown.wheels.unit_axes)
-                about = rows.applied_torque[:, :3] + of_wheels
+                wheel_torque = product(rows.wheel_torques, flown.wheels.unit_axes)
+                about = rows.applied_torque[:, :3] + wheel_torque
             loads = np.hstack([force, about])[1:]
             torque += turned(loads, loads)
         if self._disturbance.table:
@@ -182,7 +182,7 @@ class MomentumSeries:
         return whole
 
 
-def momentum_of(log: FlightLog) -> Momentum:
+def whole_momentum(log: FlightLog) -> Momentum:
     """Return the momentum of a whole log; raises as `MomentumSeries`."""
     return MomentumSeries(AnalysedLog(log)).of(0, log.ticks)
 
@@ -208,7 +208,7 @@ def momentum(flight: AnalysedLog) -> TimeSeries | None:
     if not flight.log.flight.get("base_actuators"):
         return None
     # without wheels the robot's momentum is to stay what it was, and says nothing of the drift
-    of_what = "robot" if flight.actuators.wheel_count else "base"
+    whose = "robot" if flight.actuators.wheel_count else "base"
     names = ["robot", "base", "wheels", "outside", "drift"]
     axes: dict[str, list[int]] = {f"momentum_{name}": [k] for k, name in enumerate(names)}
     if flight.actuators.thruster_count:
@@ -225,7 +225,7 @@ def momentum(flight: AnalysedLog) -> TimeSeries | None:
         return np.column_stack([norms(part) for part in parts])
 
     def derive(numbers: dict[str, float]) -> dict[str, float]:
-        size = numbers[f"momentum_{of_what}.max"]
+        size = numbers[f"momentum_{whose}.max"]
         drift = numbers["momentum_drift.max"]
         return {"momentum_drift.relative": drift / size} if size else {}
 
@@ -269,7 +269,7 @@ def state_before(exchange: CaptureEvent, row: FlightLog, wheels: WheelSettings) 
 
     The row is the truth when it has happened; of several events at one tick take the last first.
     """
-    axes = axes_of(row)[:, :, 0]
+    axes = body_axes(row)[:, :, 0]
     columns: dict[str, Any] = {name: getattr(row, name)[0] for name in VELOCITIES}
     columns["omega_base"] = product(columns["omega_base"], axes)
     ends = np.cumsum([len(column) for column in columns.values()])[:-1]
@@ -282,7 +282,7 @@ def state_before(exchange: CaptureEvent, row: FlightLog, wheels: WheelSettings) 
 
 def _has_free_targets(flight: AnalysedLog) -> bool:
     with suppress(ValueError):
-        events = events_of(flight.log)
+        events = flown_events(flight.log)
         return any(isinstance(event, Capture) and event.target.is_in_orbit for event in events)
     return False
 
@@ -294,7 +294,7 @@ def _has_free_targets(flight: AnalysedLog) -> bool:
 )
 def missed_captures(flight: AnalysedLog) -> dict[str, float]:
     """Return the distances of the captures that missed their target, and did not happen."""
-    log, captures = flight.log, captures_of(flight.log)
+    log, captures = flight.log, flown_captures(flight.log)
     for tick in captures.ticks(log.first_tick, log.first_tick + log.ticks):
         row = log.rows(tick - log.first_tick, tick - log.first_tick + 1)
         for exchange in captures.at(tick):

@@ -41,15 +41,15 @@ class OwnMetric(NamedTuple):
 
     name: str
     text: str
-    """Name of the function, see `text_of`."""
+    """Name of the function, see `importable_text`."""
 
     def value(self, log: FlightLog) -> float:
         """Return the metric of a flight, which need not be finite, or raise InputError."""
-        return call(function_of(self.text), log, f"metric {self.name}")
+        return call(metric_function(self.text), log, f"metric {self.name}")
 
     def finite_value(self, log: FlightLog) -> float:
         """Return the metric of a flight as `value` does; MetricError: it is not finite."""
-        return finite_value(function_of(self.text), log, f"metric {self.name}")
+        return finite_value(metric_function(self.text), log, f"metric {self.name}")
 
 
 def call(function: MetricFunction, log: FlightLog, what: str) -> float:
@@ -76,7 +76,7 @@ def call(function: MetricFunction, log: FlightLog, what: str) -> float:
 def finite_value(function: MetricFunction | str, log: FlightLog, what: str = "") -> float:
     """Return the finite metric of a flight, by a function or its name; else raise InputError."""
     if isinstance(function, str):
-        return OwnMetric(name_of(function), function).finite_value(log)
+        return OwnMetric(function_name(function), function).finite_value(log)
     if not callable(function):
         raise InputError(f"a function or file.py:FUNCTION was expected, got {short(function)}")
     what = what or f"metric {getattr(function, '__name__', type(function).__name__)}"
@@ -85,7 +85,7 @@ def finite_value(function: MetricFunction | str, log: FlightLog, what: str = "")
     return value
 
 
-def function_of(text: str) -> MetricFunction:
+def metric_function(text: str) -> MetricFunction:
     """Return a metric's function by its name; raise InputError if it cannot be imported."""
     if text.startswith(SESSION):
         if text not in _SESSION:
@@ -108,7 +108,7 @@ def check_text(text: str) -> str:
     return text
 
 
-def text_of(metric: object) -> str:
+def importable_text(metric: object) -> str:
     """Return the name of a function, given as the function itself or as its name.
 
     It is ``module:FUNCTION`` or ``file.py:FUNCTION`` if another process can import the function
@@ -129,7 +129,7 @@ def text_of(metric: object) -> str:
     return text
 
 
-def name_of(text: str) -> str:
+def function_name(text: str) -> str:
     """Return the last part of a function's name, ``overshoot`` of ``mine.py:overshoot``."""
     return text.rpartition(":")[2].rpartition(".")[2]
 
@@ -144,13 +144,13 @@ def check_names(names: Iterable[str]) -> None:
 def parse(text: str) -> OwnMetric:
     """Parse ``file.py:FUNCTION`` or ``NAME=file.py:FUNCTION``, and import it, or InputError."""
     name, sign, function = text.partition("=")
-    metric = OwnMetric(name, function) if sign else OwnMetric(name_of(text), text)
-    function_of(metric.text)
+    metric = OwnMetric(name, function) if sign else OwnMetric(function_name(text), text)
+    metric_function(metric.text)
     check_names([metric.name])
     return metric
 
 
-def of_mapping(metrics: Mapping[str, str]) -> list[OwnMetric]:
+def listed_metrics(metrics: Mapping[str, str]) -> list[OwnMetric]:
     """Return the metrics of a mapping of names to functions' names."""
     return [OwnMetric(name, text) for name, text in metrics.items()]
 

@@ -28,7 +28,7 @@ from .errors import (
 )
 from .external_torques import torques_by_source
 from .measure import column_definition, column_label
-from .momentum import Momentum, momentum_of
+from .momentum import Momentum, whole_momentum
 from .series import GROUPS, SeriesGroup
 from .tool_path import ToolPath, leads_tool
 
@@ -103,7 +103,7 @@ def plotted(
     return register
 
 
-def quantities_of(
+def flown_quantities(
     flight: AnalysedLog, kinds: Collection[str] = ()
 ) -> Iterator[tuple[str, PlottedQuantity]]:
     """Yield the kind and the quantity of all that a flight has, or of some ``kinds``."""
@@ -264,7 +264,7 @@ def _thrusters(flight: AnalysedLog) -> Quantities:
     flow = np.nan_to_num(shares * thrusters.mass_flow).sum(axis=1)
     used = 1e3 * log.timebase.period * np.cumsum(flow)[:, np.newaxis]
     yield PlottedQuantity("propellant", "g", ["used"], used, is_shown=False)
-    centre = momentum_of(log).centre_of_mass
+    centre = whole_momentum(log).centre_of_mass
     yield PlottedQuantity("robot pushed", "m", AXES, centre - centre[0], is_shown=False)
 
 
@@ -276,7 +276,7 @@ def _thrusters(flight: AnalysedLog) -> Quantities:
 )
 def _momentum(flight: AnalysedLog) -> Quantities:
     is_drawn = bool(flight.log.flight.get("base_actuators"))
-    for title, values in _parts(momentum_of(flight.log), flight):
+    for title, values in _parts(whole_momentum(flight.log), flight):
         yield PlottedQuantity(title, "N m s", AXES, values, is_shown=False, is_drawn=is_drawn)
 
 

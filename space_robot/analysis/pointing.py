@@ -22,9 +22,9 @@ from .analysed_log import ANGLES, AnalysedLog, window_ticks
 from .errors import (
     attitude_drift,
     joined_error,
-    quaternions_of,
     relative_attitude,
     rotation_vectors,
+    unit_quaternions,
 )
 from .series import Definition, TimeSeries, metrics, series
 
@@ -193,7 +193,7 @@ def navigation(flight: AnalysedLog) -> TimeSeries | None:
         seen = np.full_like(error, np.nan) if known is None else known[start:stop]
         turned = np.full((stop - start, 3), np.nan)
         if (rows := np.isfinite(seen).all(axis=1)).any():
-            assumed, true = (quaternions_of(-e[rows, :3]) for e in (seen, error))
+            assumed, true = (unit_quaternions(-e[rows, :3]) for e in (seen, error))
             turned[rows] = np.degrees(rotation_vectors(relative_attitude(assumed, true)))
         return np.hstack([seen - error, turned])
 

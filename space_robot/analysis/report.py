@@ -13,13 +13,13 @@ from space_robot_msgs_py.errors import InputError
 
 from ..console.tables import Column, JudgedCell, Table
 from .analysed_log import AnalysedLog, PointingBudget
-from .described import actuators_of, event_labels, navigation_of, sensors_of, start_step_of
+from .described import event_labels, flown_name, recorded_start_step
 from .errors import UNAVAILABLE
 from .measure import evaluate
 from .report_tables import comparison_table, sizing_table
 from .series import GROUPS
 from .sizing import ActuatorSet, load_requirements
-from .words import Report, law_of, notes, remarks, warnings
+from .words import Report, law_text, notes, remarks, warnings
 
 if TYPE_CHECKING:
     import jinja2
@@ -94,10 +94,8 @@ def _flown(flight: AnalysedLog, flight_ticks: int) -> dict[str, Any]:
         "events": event_labels(log),
         **{k: log.flight[k] for k in ("own_gains",) if k in log.flight},
         **{k: str(log.flight[k]) for k in ("disturbance",) if k in log.flight},
-        "start_step": start_step_of(log),
-        "sensors": sensors_of(log),
-        "navigation": navigation_of(log),
-        "actuators": actuators_of(log),
+        "start_step": recorded_start_step(log),
+        **{key: flown_name(log, key) for key in ("sensors", "navigation", "actuators")},
         "truth_recorded": log.measured is not None,
         **({"controller": laws[0].name} if laws else {}),
         "laws": as_data(laws, log.timebase),
@@ -112,7 +110,7 @@ def _flown(flight: AnalysedLog, flight_ticks: int) -> dict[str, Any]:
 def _sizing(
     flight: AnalysedLog, other: ActuatorSet | None, numbers: dict[str, float]
 ) -> dict[str, Any]:
-    name, settings = other or ActuatorSet(actuators_of(flight.log), flight.actuators)
+    name, settings = other or ActuatorSet(flown_name(flight.log, "actuators"), flight.actuators)
     judged = [requirement.as_data() for requirement in load_requirements(settings, numbers)]
     return {"actuators": name, "flown": other is None, "requirements": judged}
 
@@ -167,7 +165,7 @@ def _recorded(reports: Mapping[str, Report]) -> Table:
     rows = [
         [
             name,
-            law_of(report) or "not said",
+            law_text(report) or "not said",
             *(report[key] or "not said" for key in ("case", "gains", "robot")),
             f"{report['from_s']:g} to {report['to_s']:g} s",
             report["ticks"]

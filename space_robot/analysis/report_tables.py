@@ -12,9 +12,9 @@ from space_robot_msgs_py.topics import BASE_AXES
 
 from ..console.tables import NONE, Column, Group, JudgedCell, Row, Table
 from .described import IDEAL
-from .measure import column_definition, describe, group_of
+from .measure import column_definition, describe, metric_group
 from .series import GROUPS
-from .words import Report, analyzed, flown, law_of, notes, of_statistic, remarks, seen_through
+from .words import Report, analyzed, flown, law_text, notes, remarks, seen_through, with_statistic
 
 IN_RMS_TABLE = ("rms", "rms_eq64", "variation", "chatter", "ripple")
 """Statistics of the table of RMS."""
@@ -58,7 +58,7 @@ def rms_table(report: Report) -> Table:
 
 def table_v_columns(metrics: Mapping[str, float]) -> list[str]:
     """Return the columns of errors and torques of Table V; of the attitude that of its angles."""
-    return [c for c in of_statistic(metrics, "rms_eq64") if column_definition(c).is_shown]
+    return [c for c in with_statistic(metrics, "rms_eq64") if column_definition(c).is_shown]
 
 
 def metrics_table(report: Report) -> Table:
@@ -81,11 +81,11 @@ def metrics_table(report: Report) -> Table:
 def comparison_table(reports: Mapping[str, Report]) -> Table:
     """Tabulate all metrics of several bags, a column each."""
     each = list(reports.values())
-    flights: list[list[Any]] = [["controller", *map(law_of, each)]]
+    flights: list[list[Any]] = [["controller", *map(law_text, each)]]
     described = ["case", "gains", "robot"]
     if any(report["truth_recorded"] or report["sensors"] != IDEAL for report in each):
         described += ["sensors", "navigation"]
-        flights.append(["errors are of", *map(_errors_of, each)])
+        flights.append(["errors are of", *map(_error_source, each)])
     for key in described:
         flights.append([key, *(report[key] and str(report[key]) for report in each)])
     flights.append(["time (s)", *(f"{r['from_s']:g} to {r['to_s']:g}" for r in each)])
@@ -103,16 +103,16 @@ def shown_names(reports: Sequence[Report]) -> list[str]:
     order = list(dict.fromkeys(group.title for group in GROUPS.values()))
     names = dict.fromkeys(name for report in reports for name in report["metrics"])
     shown = [name for name in names if describe(name).is_shown]
-    return sorted(shown, key=lambda name: [*order, OWN_METRICS].index(title_of(name)))
+    return sorted(shown, key=lambda name: [*order, OWN_METRICS].index(metric_title(name)))
 
 
-def title_of(name: str) -> str:
+def metric_title(name: str) -> str:
     """Return the title of a metric's group."""
-    group = group_of(name)
+    group = metric_group(name)
     return group.title if group else OWN_METRICS
 
 
-def text_of(name: str, value: float) -> str:
+def number_text(name: str, value: float) -> str:
     """Write the number of a metric as a table shows it."""
     unit = describe(name).unit
     if not np.isfinite(value):
@@ -125,12 +125,12 @@ def text_of(name: str, value: float) -> str:
 def _groups(reports: Sequence[Report], names: Sequence[str]) -> list[Group]:
     """Return a row for each name, in groups by title; a group's note has the meanings."""
     groups = []
-    for title, own in groupby(names, key=title_of):
+    for title, own in groupby(names, key=metric_title):
         rows, meanings = [], dict[str, None]()
         for name in own:
             unit, text, *_ = describe(name)
             values = [report["metrics"].get(name) for report in reports]
-            texts = [NONE if value is None else text_of(name, value) for value in values]
+            texts = [NONE if value is None else number_text(name, value) for value in values]
             rows.append([f"{name} ({unit})" if unit.strip("-") else name, *texts])
             meanings |= {f"{name.rpartition('.')[2] or name}: {text}": None} if text else {}
         groups.append(Group(rows, title, "; ".join(meanings)))
@@ -159,7 +159,7 @@ def _recording(reports: Sequence[Report]) -> list[Group]:
     return [Group(rows, "recording", "what is missing of the flight or is wrong with the bag")]
 
 
-def _errors_of(report: Report) -> str:
+def _error_source(report: Report) -> str:
     is_truth = report["truth_recorded"] or report["sensors"] == IDEAL
     return "the truth" if is_truth else "what was measured"
 

@@ -33,7 +33,7 @@ from ..flight.capability import (
 )
 from .actuation import ROUNDING, wheel_motion
 from .analysed_log import AnalysedLog
-from .external_torques import axes_of
+from .external_torques import body_axes
 from .series import Definition, metrics
 
 Array = NDArray[np.float64]
@@ -262,8 +262,8 @@ class BaseDemand:
         return np.where(np.isfinite(commands), commands, torque)
 
     def _taken_up(self, start: int, stop: int, torque: Array) -> Array:
-        axes = axes_of(self._log.rows(start, stop))
-        first = axes_of(self._log.rows(max(start - 1, 0), max(start - 1, 0) + 1))
+        axes = body_axes(self._log.rows(start, stop))
+        first = body_axes(self._log.rows(max(start - 1, 0), max(start - 1, 0) + 1))
         mean_axes = 0.5 * (axes + np.concatenate([first, axes[:, :, :-1]], axis=2))
         impulse = self._log.timebase.period * to_inertial(mean_axes, torque.T)
         if start == 0:  # the interval before the first row is not of this flight
@@ -276,7 +276,7 @@ class BaseDemand:
         rows, wheels = self._log.rows(start, stop), self._wheels
         held, axes = (
             product(wheels.spin_momenta(rows.wheel_velocities), wheels.unit_axes),
-            axes_of(rows),
+            body_axes(rows),
         )
         if start == 0:
             self._taken = to_inertial(axes[:, :, :1], held[:1].T)
@@ -292,7 +292,7 @@ def other_wheels(
     They share the demand in the rows from ``start`` on by least squares of their loads.
     """
     rows = log.rows(start, start + len(demand.torque))
-    carried = carried_momentum(wheels, axes_of(log.rows(0, 1)), axes_of(rows))
+    carried = carried_momentum(wheels, body_axes(log.rows(0, 1)), body_axes(rows))
     return wheel_loads(wheels, demand.torque, demand.momentum + carried, demand.omega)
 
 

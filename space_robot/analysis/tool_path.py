@@ -26,7 +26,7 @@ from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.errors import InputError
 
 from .analysed_log import AnalysedLog
-from .described import captures_of, settings_of
+from .described import flown_captures, flown_settings
 from .momentum import happens_in
 from .pointing import rotation_angle
 from .series import Definition, TimeSeries, series
@@ -50,8 +50,8 @@ class ToolPath:
         robot, which is not the true one's if the true base's centre of mass is elsewhere. That
         frame is at the path's origin at the first row.
         """
-        self._log, self._captures = log, captures_of(log)
-        self._robot = settings_of(log).robots.controller.nominal
+        self._log, self._captures = log, flown_captures(log)
+        self._robot = flown_settings(log).robots.controller.nominal
         first = log.rows(0, 1)
         true = self._captures.robot_at(first.first_tick - 1)  # the first tick's events follow
         reference = unit_rows(first.reference_base[:, :4]), first.reference_joints[:, 0]
@@ -139,7 +139,7 @@ def leads_tool(log: FlightLog) -> bool:
     if not log.flight.get("mission") or not log.ticks:
         return False
     try:
-        settings, period, last = settings_of(log), log.timebase.period, float(log.time[-1])
+        settings, period, last = flown_settings(log), log.timebase.period, float(log.time[-1])
         mission = Mission(settings.robots.controller, settings.mission, period)
         if mission.leads_tool:
             return True

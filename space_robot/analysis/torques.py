@@ -187,8 +187,8 @@ def ripple(flight: AnalysedLog) -> dict[str, float]:
             numbers[f"{name}.ripple_peak"] = peak.rms
         if (lasting := spectrum.lasting(axes)) is not None:
             numbers[f"{name}.ripple_lasting"] = lasting
-    axes_of = zip(flight.axis_names, rms, strict=True)
-    return numbers | {f"{name}.ripple_axis": float(value) for name, value in axes_of}
+    each = zip(flight.axis_names, rms, strict=True)
+    return numbers | {f"{name}.ripple_axis": float(value) for name, value in each}
 
 
 def lacking_for_ripple(name: str, seconds: float, period: float) -> str:
@@ -268,9 +268,9 @@ def segment_spectra(
     length = len(window)
     time = np.arange(length) - 0.5 * (length - 1)
     starts = range(0, ticks - length + 1, step)
-    together = max(1, (BLOCK_TICKS - length) // step + 1)
-    for first in range(0, len(starts), together):
-        part = starts[first : first + together]
+    group = max(1, (BLOCK_TICKS - length) // step + 1)
+    for first in range(0, len(starts), group):
+        part = starts[first : first + group]
         rows = values(part[0], part[-1] + length)
         for start in part:
             segment = rows[start - part[0] : start - part[0] + length]

@@ -31,7 +31,7 @@ LASTING_CYCLE = 0.5
 
 def flown(described: Mapping[str, Any]) -> str:
     """Say in a few words what was flown, by a report or the description in a bag."""
-    law = law_of(described)
+    law = law_text(described)
     has_gains = law != NoLaw.name
     keys = ("case", "gains") if has_gains else ("case",)
     known = [f"{key} {described[key]}" for key in keys if described.get(key)]
@@ -42,10 +42,14 @@ def flown(described: Mapping[str, Any]) -> str:
 
 def analyzed(report: Report) -> str:
     """Say how much was analyzed, and what share of the flight that is if it is not all of it."""
-    ticks, of_all, seconds = report["ticks"], report["flight_ticks"], f"{report['duration_s']:g} s"
-    if ticks == of_all:
+    ticks, flight_ticks, seconds = (
+        report["ticks"],
+        report["flight_ticks"],
+        f"{report['duration_s']:g} s",
+    )
+    if ticks == flight_ticks:
         return f"{ticks} ticks, {seconds}"
-    return f"{ticks / of_all:.1%} of the flight, {ticks} of {of_all} ticks, {seconds}"
+    return f"{ticks / flight_ticks:.1%} of the flight, {ticks} of {flight_ticks} ticks, {seconds}"
 
 
 def seen_through(report: Report) -> str:
@@ -57,7 +61,7 @@ def seen_through(report: Report) -> str:
     )
 
 
-def law_of(described: Mapping[str, Any]) -> str | None:
+def law_text(described: Mapping[str, Any]) -> str | None:
     """Name the law, or all the laws and when they changed; None: nobody says."""
     return in_words(described.get("laws", ())) or described.get("controller")
 
@@ -130,7 +134,7 @@ def _pointing(base: dict[str, Any] | None, metrics: Metrics) -> Iterator[str]:
 
 
 def _saturated_wheels(metrics: Metrics) -> Iterator[str]:
-    if first := of_statistic(metrics, "first_limit"):
+    if first := with_statistic(metrics, "first_limit"):
         name = min(first, key=lambda wheel: first[wheel])
         yield (
             "wheels were at a limit of torque or momentum at "
@@ -140,7 +144,7 @@ def _saturated_wheels(metrics: Metrics) -> Iterator[str]:
 
 
 def _reversing_wheels(metrics: Metrics) -> Iterator[str]:
-    rates = of_statistic(metrics, "reversals")
+    rates = with_statistic(metrics, "reversals")
     if often := [f"{name} {rate:.2g}" for name, rate in rates.items() if rate >= OFTEN_REVERSED]:
         yield f"wheels that change their sense of rotation, times a second: {', '.join(often)}"
 
@@ -150,7 +154,7 @@ def limit_cycles(metrics: Metrics) -> Iterator[str]:
     cycles = [
         f"{name} at {metrics[f'{name}.ripple_peak_hz']:.3g} Hz with {peak:.2g} "
         f"{column_definition(name).unit} RMS"
-        for name, peak in of_statistic(metrics, "ripple_peak").items()
+        for name, peak in with_statistic(metrics, "ripple_peak").items()
         if metrics[f"{name}.ripple_peak_hz"] <= FASTEST_CYCLE
         and metrics.get(f"{name}.ripple_lasting", 0.0) >= LASTING_CYCLE
         and peak >= PURE_CYCLE * metrics[f"{name}.ripple"]
@@ -161,7 +165,7 @@ def limit_cycles(metrics: Metrics) -> Iterator[str]:
 
 
 def _standing_joints(metrics: Metrics) -> Iterator[str]:
-    standing = of_statistic(metrics, "standing")
+    standing = with_statistic(metrics, "standing")
     much = [f"{name} {share:.0%}" for name, share in standing.items() if share >= LONG_STANDING]
     if much:
         yield f"joints that stood still on a part of the way they were to move: {', '.join(much)}"
@@ -169,7 +173,7 @@ def _standing_joints(metrics: Metrics) -> Iterator[str]:
 
 def _beyond_limits(metrics: Metrics) -> Iterator[str]:
     joints = []
-    for name in of_statistic(metrics, "beyond_position"):
+    for name in with_statistic(metrics, "beyond_position"):
         ticks = {kind: metrics[f"{name}.beyond_{kind}"] for kind in LIMIT_KINDS}
         if texts := [f"{kind} at {count:.0f} ticks" for kind, count in ticks.items() if count]:
             joints.append(f"{name} ({', '.join(texts)})")
@@ -178,7 +182,7 @@ def _beyond_limits(metrics: Metrics) -> Iterator[str]:
 
 
 def _near_limits(metrics: Metrics) -> Iterator[str]:
-    shares = of_statistic(metrics, "effort_used")
+    shares = with_statistic(metrics, "effort_used")
     if near := [f"{name} {share:.0%}" for name, share in shares.items() if NEAR <= share <= 1.0]:
         yield f"joints near their limit of effort: {', '.join(near)}"
 
@@ -190,7 +194,7 @@ def _missing_ticks(report: Report) -> Iterator[str]:
         yield f"ticks without a usable state, shown as the one before: {report['filled_ticks']}"
 
 
-def of_statistic(metrics: Metrics, statistic: str) -> dict[str, float]:
+def with_statistic(metrics: Metrics, statistic: str) -> dict[str, float]:
     """Return the metrics of one statistic, by what they are of."""
     end = f".{statistic}"
     return {k.removesuffix(end): value for k, value in metrics.items() if k.endswith(end)}

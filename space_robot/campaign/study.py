@@ -19,7 +19,7 @@ from space_robot_msgs_py.errors import InputError, explained_by
 
 from ..analysis.analysed_log import PointingBudget
 from ..analysis.measure import Window
-from ..analysis.own_metric import check_names, text_of
+from ..analysis.own_metric import check_names, importable_text
 from ..scenario.objects import as_disturbance
 from ..scenario.options import OPTIONS
 from ..scenario.resolve import resolve
@@ -193,7 +193,7 @@ class Study(StrictModel):
     @classmethod
     def _are_functions(cls, metrics: dict[str, Any]) -> dict[str, str]:
         check_names(metrics)
-        return {name: text_of(function) for name, function in metrics.items()}
+        return {name: importable_text(function) for name, function in metrics.items()}
 
     @field_validator("until", mode="after")
     @classmethod

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..analysis.words import Metrics, limit_cycles, of_statistic
+from ..analysis.words import Metrics, limit_cycles, with_statistic
 from ..campaign.draws import Draws
 from ..campaign.study import Study
 from ..campaign.verdicts.laws import PairedComparison, compare
@@ -94,12 +94,12 @@ class FlownCandidate:
         cycles = [text for flight in flown for text in limit_cycles(flight)]
         if len(cycles) > OFTEN * count:
             return f"{cycles[0]} (in {len(cycles)} of {count} flights)"
-        if any(any(of_statistic(flight, "beyond_effort").values()) for flight in flown):
+        if any(any(with_statistic(flight, "beyond_effort").values()) for flight in flown):
             return "joints beyond their limits of effort"
         share = float(np.median([flight.get("wheels.saturation", 0.0) for flight in flown]))
         if share > MOST_SATURATION:
             return f"wheels at their limit in {share:.0%} of the ticks"
-        for name in of_statistic(flown[0], "standing"):
+        for name in with_statistic(flown[0], "standing"):
             held = float(np.median([flight.get(f"{name}.standing", 0.0) for flight in flown]))
             if held > HELD:
                 return f"{name} held by friction on {held:.0%} of its way"

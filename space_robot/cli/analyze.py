@@ -186,10 +186,10 @@ def _actuator_set(log: FlightLog, name: str | None) -> ActuatorSet | None:
         return None
     from space_robot_control.allocation.settings import assumed_actuators
 
-    from ..analysis.described import robot_of
+    from ..analysis.described import flown_robot
     from ..analysis.sizing import ActuatorSet
 
-    return ActuatorSet(name, assumed_actuators(name, robot_of(log)))
+    return ActuatorSet(name, assumed_actuators(name, flown_robot(log)))
 
 
 def _print(reports: dict[str, dict[str, Any]], as_json: bool) -> None:

@@ -81,7 +81,7 @@ def run(file: str, out: Path | None, as_json: bool, **options: Any) -> None:
     from ..console.terminal import echo_json, terminal
     from .campaign_display import as_record, print_summary
 
-    folder = out or Path("campaigns") / name_of(Path(file))
+    folder = out or Path("campaigns") / campaign_name(Path(file))
     latest: list[Progress] = []
     try:
         with rated_progress("flights") as show:
@@ -113,7 +113,7 @@ def run(file: str, out: Path | None, as_json: bool, **options: Any) -> None:
         print_summary(flown, terminal())
 
 
-def name_of(file: Path) -> str:
+def campaign_name(file: Path) -> str:
     """Return the name of a campaign: of its file, or of the folder of its ``campaign.yaml``."""
     in_own_folder = file.stem in ("campaign", "study")
     return file.parent.resolve().name if in_own_folder else file.stem

@@ -79,8 +79,10 @@ def _plan(
 def launch_arguments() -> list[LaunchArgument]:
     """Return the arguments; each may be left empty, for the option's default."""
     options = [option for option in _plan.params if isinstance(option, click.Option)]
-    of_file = LaunchArgument(PARAMS_FILE, "ROS parameter file for the nodes, over all the rest.")
-    return [*(_argument(option) for option in options), of_file]
+    file_argument = LaunchArgument(
+        PARAMS_FILE, "ROS parameter file for the nodes, over all the rest."
+    )
+    return [*(_argument(option) for option in options), file_argument]
 
 
 def _argument(option: click.Option) -> LaunchArgument:

@@ -122,7 +122,7 @@ def _robot_options(function: Any) -> Any:
     """Give a command --robot, with --base and --repair, which apply to a URDF."""
 
     @wraps(function)
-    def with_choice_of_urdf(*args: Any, base: str | None, repair: bool, **options: Any) -> Any:
+    def with_urdf_choice(*args: Any, base: str | None, repair: bool, **options: Any) -> Any:
         if base or repair:
             from space_robot_model.robot.find import with_choice
 
@@ -130,8 +130,8 @@ def _robot_options(function: Any) -> Any:
         return function(*args, **options)
 
     for decorator in (REPAIR, BASE, _click_option("robot")):
-        decorator(with_choice_of_urdf)
-    return with_choice_of_urdf
+        decorator(with_urdf_choice)
+    return with_urdf_choice
 
 
 BASE = click.option("--base", metavar="LINK", help="The satellite, of a URDF [default: its root].")
@@ -236,7 +236,7 @@ OTHERS: dict[str, Decorator] = {
     "scenario": _scenario_option(
         "YAML file with any of these options; those given here come first."
     ),
-    "scenario_of_flight": _scenario_option(
+    "flight_scenario": _scenario_option(
         "YAML file of a flight's options, of which those of this command count.", OPTIONS
     ),
     "json": click.option("--json", "as_json", is_flag=True, help="Print the report as JSON."),

@@ -15,7 +15,7 @@ from .options import file_option, flight_options, resolve_options
 
 @click.command()
 @click.argument("mission", default="", type=click.UNPROCESSED, shell_complete=names_in("missions"))
-@flight_options("robot", "orbit", "actuators", "period", "scenario_of_flight", "set", "json")
+@flight_options("robot", "orbit", "actuators", "period", "flight_scenario", "set", "json")
 @click.option(
     "--base-torque",
     type=FiniteRange(min=0.0, min_open=True),

@@ -11,7 +11,7 @@ from rich.console import Console
 
 from space_robot_msgs_py.bag.law_history import in_words
 
-from ..analysis.words import flown as words_of
+from ..analysis.words import flown as flown_words
 from ..console.files import csv_rows, csv_writer
 from ..console.tables import Column, Table, named
 from ..console.terminal import print_table, say
@@ -85,7 +85,7 @@ def verdict(report: dict[str, Any]) -> str:
         return "the commands are the recorded ones, to the last bit"
     if not report["judged"]:
         return (
-            f"{words_of(flown)} was flown: the differences are what the other would have "
+            f"{flown_words(flown)} was flown: the differences are what the other would have "
             "commanded on the same history (open loop)"
         )
     if first and report["differs"]:

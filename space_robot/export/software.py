@@ -33,7 +33,7 @@ from ..flight.plan import Flight, Scenario, resolve
 Array = NDArray[np.float64]
 
 
-def laws_of(flight: Flight, further: Sequence[str] = ()) -> list[ControlLaw]:
+def exported_laws(flight: Flight, further: Sequence[str] = ()) -> list[ControlLaw]:
     """Return the laws of a flight: in force at the start, swapped to, and ``further`` ones.
 
     Raises:
@@ -51,7 +51,7 @@ def export(flight: Flight, further: Sequence[str] = ()) -> Exported:
         InputError: a law or kernel has no translation to C.
     """
     settings, scenario = flight.controller_settings, flight.scenario
-    laws = laws_of(flight, further)
+    laws = exported_laws(flight, further)
     robot = f"the robot {scenario.robots.controller.name!r}, as the controller knows it"
     sources = {law.name: f"gain set {settings.gains!r}, law {law.name}" for law in laws}
     limits = settings.hold_ticks, settings.longest_jump
@@ -113,7 +113,7 @@ def recorded_flights(
     shorter = plan if seconds is None else plan.model_copy(update={"duration": seconds})
     flight = Flight(resolve(shorter))
     yield RecordedFlight("mission", "the scenario", _flown(flight, exported))
-    laws = [law.name for law in laws_of(flight, further)]
+    laws = [law.name for law in exported_laws(flight, further)]
     for place, law in enumerate(laws):
         faults = [*FAULTS, *_hardware_faults(flight)]
         update = {"faults": faults, "case": "3", "duration": FAULTY_S}

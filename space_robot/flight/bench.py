@@ -94,10 +94,10 @@ class FlightBench(RecordOwner):
         self._first = 0
         """Tick of the first row of ``_desired``."""
         self._reference_block = Reference.block(flight.robot.n)
-        self._look_into_blocks()
+        self._bind_views()
         self.reset()
 
-    def _look_into_blocks(self) -> None:
+    def _bind_views(self) -> None:
         self._reference = Reference.view(self._reference_block)
 
     def reset(self, seed: int | None = None) -> RobotState:

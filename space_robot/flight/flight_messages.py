@@ -82,10 +82,10 @@ class Messages:
         """Write the true state of a tick, with some before it."""
         self._record_all(self._truth.add(state))
 
-    def show(self, tick: int, state_of: Callable[[int], RobotState]) -> None:
+    def show(self, tick: int, get_state: Callable[[int], RobotState]) -> None:
         """Write the poses of a tick's true state, if they are due."""
         if self._scene.is_due(tick):
-            self._record_all(self._scene.poses(state_of(tick)))
+            self._record_all(self._scene.poses(get_state(tick)))
 
     def end(self) -> None:
         """Write the buffered messages."""

@@ -235,7 +235,7 @@ class ReachVectorEnv(VectorEnv[Array, Array, Array]):
             np.arange(groups), as_whole_number(threads, "threads", 1, MOST_THREADS)
         )
         self._parts = [slice(int(part[0]), int(part[-1]) + 1) for part in parts if len(part)]
-        self._work = [_work_of(task.begin) for _ in self._parts]
+        self._work = [_motor_work(task.begin) for _ in self._parts]
         self._pool: ThreadPoolExecutor | None = None
         self._pool_process = 0
         """Of the pool's threads: a forked process has none of them."""
@@ -344,7 +344,7 @@ def _checked(action: Any, shape: tuple[int, ...]) -> Array:
     return numbers
 
 
-def _work_of(plant: Plant) -> InLanes:
+def _motor_work(plant: Plant) -> InLanes:
     records = in_lanes(PlantMemory, len(plant.names.joints))
     records.alone[:] = plant.block
     records.numbers[:] = records.numbers_alone.T

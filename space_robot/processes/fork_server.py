@@ -52,7 +52,7 @@ class ForkServer:
             self._pid = start(theirs, self._socket)
 
     @classmethod
-    def of_module(cls, module: str) -> ForkServer:
+    def as_program(cls, module: str) -> ForkServer:
         """Start the server as a program; ``module`` calls `serve_standard_input`."""
 
         def start(theirs: socket.socket, ours: socket.socket) -> int:
@@ -115,7 +115,7 @@ class ForkServer:
 
 
 def serve_standard_input(target: Target) -> None:
-    """Run the server that `ForkServer.of_module` has started."""
+    """Run the server that `ForkServer.as_program` has started."""
     starter = os.getppid()
     with socket.socket(fileno=os.dup(0)) as end:
         os.dup2(os.open(os.devnull, os.O_RDONLY), 0)

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from space_robot_control.laws.names import require_shipped_file
+from space_robot_control.laws.names import NotTrustedError, require_shipped_file
 from space_robot_msgs_py.bag.description import read_description
 from space_robot_msgs_py.bag.folder import open_bag
 from space_robot_msgs_py.config.files import Tree, flatten
-from space_robot_msgs_py.config.validation import validate
+from space_robot_msgs_py.config.validation import short, validate
 from space_robot_msgs_py.errors import InputError
 from space_robot_sim.environment.disturbance_table import JSON
 from space_robot_sim.environment.events import named_targets
@@ -25,7 +26,7 @@ NAMED_FILES = (
 
 
 class ChangedNumber(NamedTuple):
-    """A setting with different values in two flights."""
+    """A setting with different values in two flights or studies."""
 
     key: str
     """Dotted path in the resolved scenario."""
@@ -66,22 +67,33 @@ def recorded_scenario(options: Tree, trusted: bool, where: str = "scenario of th
     """
     scenario = validate(Scenario, options, where)
     nodes = [dict(flatten(own)) for own in scenario.parameters.values()]
-    for settings in () if trusted else (scenario.given, *nodes):
+    mission = scenario.mission if isinstance(scenario.mission, dict) else {}
+    for settings in () if trusted else (scenario.given, mission, *nodes):
         for what in NAMED_FILES:
             name = settings.get(what, "")
             if isinstance(name, str) and not name.startswith(JSON):
                 require_shipped_file(what.partition(".")[0], name)
         for target in named_targets([str(text) for text in settings.get("events", ())]):
             require_shipped_file("target", target)
+        for text in map(str, settings.get("segments", ())):
+            if re.search(r"\bfile\b", text):
+                raise NotTrustedError(
+                    f"the bag refers to a file in {short(text)}: read only with --trust"
+                )
     return scenario
 
 
 def differences(first: Any, second: Any, path: str = "") -> Iterator[ChangedNumber]:
-    """Yield the differences of two resolved scenarios, in the order of the first's keys."""
+    """Yield the differences of two resolved scenarios or studies, in the order of the first's keys.
+
+    The order of a study's variables (``vary``) is compared, too: its draws depend on it.
+    """
     if isinstance(first, Mapping) and isinstance(second, Mapping):
         for key in dict.fromkeys((*first, *second)):
             inner = f"{path}.{key}" if path else str(key)
             yield from differences(first.get(key), second.get(key), inner)
+        if path.endswith("vary") and [*first] != [*second] and {*first} == {*second}:
+            yield ChangedNumber(f"order of {path}", ", ".join(first), ", ".join(second))
     elif _are_records(first) and _are_records(second) and len(first) == len(second):
         for number, (one, other) in enumerate(zip(first, second, strict=True)):
             name = one.get("name", number) if one.get("name") == other.get("name") else number

@@ -89,10 +89,10 @@ def linear_ripple(
     motion = rigid_motion(task.inertia[0], posture, task.period)
     loop = linear_loop(motion, linear_law(law, posture), weight)
     inputs = np.hstack(_noise_of(task, law))
-    driven = inputs @ loop.by_noise.T
-    states = np.empty_like(driven)
+    forced = inputs @ loop.by_noise.T
+    states = np.empty_like(forced)
     state = np.zeros(len(loop.step))
-    for k, change in enumerate(driven):
+    for k, change in enumerate(forced):
         states[k] = state
         state = loop.step @ state + change
     return _deviation(states @ loop.force.T + inputs @ loop.force_by_noise.T)

@@ -24,8 +24,8 @@ from space_robot_sim.environment.events import Capture
 from space_robot_sim.faults.grammar import parse_fault
 
 from ..analysis.analysed_log import AnalysedLog
-from ..analysis.described import check_joints, events_of, robot_of
-from ..analysis.plotted import PlottedQuantity, quantities_of
+from ..analysis.described import check_joints, flown_events, flown_robot
+from ..analysis.plotted import PlottedQuantity, flown_quantities
 from ..analysis.report import template
 from ..scenario.faults import KINDS
 from .actuators import actuator_notes
@@ -195,12 +195,12 @@ def shown_robot(log: FlightLog, name: str = "") -> Robot:
     if name:
         springs = dict.fromkeys(log.passive_names, Spring(0.0, 0.0))
         with suppress(InputError):  # unknown springs move nothing that is drawn
-            own = robot_of(log)
+            own = flown_robot(log)
             springs |= zip(own.passive_names, own.springs, strict=True)
         robot = find_robot(robot_as_path(name)).with_springs(springs)
         check_joints(robot, log)
         return robot
-    robot = robot_of(log)
+    robot = flown_robot(log)
     if log.trusted:
         return robot
     return replace(robot, visuals=tuple(replace(shape, mesh="") for shape in robot.visuals))
@@ -237,7 +237,7 @@ def flight_plots(
     for (name, log), colour in zip(flights.items(), cycle(colours), strict=False):
         flight = AnalysedLog(log)
         flight.robot = robots[name]
-        for kind, quantity in quantities_of(flight):
+        for kind, quantity in flown_quantities(flight):
             if is_one:
                 series = list(_axis_series(log, quantity, colours, edges))
             else:
@@ -293,7 +293,7 @@ def flight_marks(log: FlightLog) -> list[Mark]:
     end = start + log.ticks * period
     marks = list(_fault_marks(log))
     with suppress(InputError):
-        for event in events_of(log):
+        for event in flown_events(log):
             text = f"capture {event.target.name}" if isinstance(event, Capture) else "release"
             marks.append(Mark(event.time_s, event.time_s, text, "event"))
     for before, law in pairwise(laws_of(log)):

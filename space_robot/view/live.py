@@ -30,7 +30,7 @@ from space_robot_msgs_py.wire.messages import Codec, MessageDescription, describ
 from space_robot_msgs_py.wire.telemetry import LawCodec
 
 from ..analysis.analysed_log import AnalysedLog
-from ..analysis.plotted import PlottedQuantity, quantities_of
+from ..analysis.plotted import PlottedQuantity, flown_quantities
 from ..flight.graph.domain import domain_asked_for
 from ..flight.graph.monitor import Monitor
 from ..flight.graph.node_names import PLANT
@@ -175,10 +175,10 @@ class Feed:
         return log.base_position[rows], unit_rows(log.quaternion[rows]), log.all_positions[rows]
 
     def quantities(self, kinds: Collection[str] = ()) -> Iterator[tuple[str, PlottedQuantity]]:
-        """Return what can be plotted, with its kind, see `quantities_of`."""
+        """Return what can be plotted, with its kind, see `flown_quantities`."""
         flight = AnalysedLog(self.log)
         flight.robot, flight.actuators = self.robot, self.actuators
-        return quantities_of(flight, kinds)
+        return flown_quantities(flight, kinds)
 
 
 class LiveView:

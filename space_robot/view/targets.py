@@ -23,7 +23,7 @@ from space_robot_sim.environment.events import Capture, Event, Release
 from space_robot_sim.environment.impact import Grasp
 from space_robot_sim.environment.neighbouring_orbit import free_fall
 
-from ..analysis.described import captures_of, events_of, plant_settings
+from ..analysis.described import flown_captures, flown_events, plant_settings
 from ..analysis.momentum import happens_in
 from .frames import Move
 from .scene import RobotScene, add_shape, set_pose
@@ -57,7 +57,7 @@ def add_targets(
     """
     moves: list[Move] = []
     try:
-        pairs = pairwise([*events_of(log), None])
+        pairs = pairwise([*flown_events(log), None])
         captures = [(event, after) for event, after in pairs if isinstance(event, Capture)]
         for number, (event, after) in enumerate(captures):
             grasp = Grasp.of(robot, event.target)
@@ -80,7 +80,7 @@ def _as_met(event: Capture, log: FlightLog) -> Capture | None:
     """
     if not event.target.is_in_orbit:
         return event
-    captures = captures_of(log)
+    captures = flown_captures(log)
     exchange = next(exchange for exchange in captures.exchanges if exchange.event == event)
     row = int(exchange.tick) - log.first_tick
     if 0 <= row < log.ticks:

@@ -108,7 +108,7 @@ class Controller(RecordOwner):
             how = allocation or AllocationSettings()
             assign(memory, allocation=Allocation.build(robot.n, actuators, how, period))
         self._robot = robot.nominal
-        self._look_into_blocks()
+        self._bind_views()
         self.last_command = Command(-1, np.zeros(len(self.names.commanded)))
         """Command of the last tick, overwritten by the next."""
         self.valves = slice(robot.n + 3 + actuators.wheel_count, None)
@@ -127,7 +127,7 @@ class Controller(RecordOwner):
         corner, filters = settings.acceleration_filter_hz, settings.filter_settings
         return cls(robot, law, settings.period, corner, filters, actuators, settings.allocation)
 
-    def _look_into_blocks(self) -> None:
+    def _bind_views(self) -> None:
         self._memory: ControllerMemory = self.block[0]
         self._reference: Block = self.block["signals"]["reference"]
         allocated: Block = self.block["allocation"]
@@ -169,7 +169,7 @@ class Controller(RecordOwner):
         """Keep the memory in another ``block`` from now on, beside that of other flights."""
         block[:] = self.block
         self.block = block
-        self._look_into_blocks()
+        self._bind_views()
 
     def save(self) -> ControllerSnapshot:
         """Save the state of the controller and its law."""

@@ -159,12 +159,12 @@ class ControlLaw(RecordOwner, ABC):
         self.period = period
         self.gains_block = self.gains_type.block(n)
         self.memory_block = self.memory_type.block(n)
-        self._look_into_blocks()
+        self._bind_views()
         self._given = self.optional_gains() & gains.keys()
         self.gain_values = gains
         self.reset()
 
-    def _look_into_blocks(self) -> None:
+    def _bind_views(self) -> None:
         self.gains: Any = self.gains_type.view(self.gains_block)
         """The gains as attributes."""
         self.memory: Any = self.memory_type.view(self.memory_block)

@@ -278,9 +278,9 @@ class RecordOwner:
     """
 
     _views: ClassVar[tuple[str, ...]]
-    """Names of the attributes that `_look_into_blocks` sets."""
+    """Names of the attributes that `_bind_views` sets."""
 
-    def _look_into_blocks(self) -> None:
+    def _bind_views(self) -> None:
         """Set the attributes that are views of the blocks."""
         raise NotImplementedError
 
@@ -300,7 +300,7 @@ class RecordOwner:
     def __setstate__(self, state: dict[str, Any]) -> None:
         """Set the attributes, and create the views of the blocks."""
         vars(self).update(state)
-        self._look_into_blocks()
+        self._bind_views()
 
     def __copy__(self) -> Self:
         """Return a deep copy: a block has one owner."""

@@ -110,7 +110,7 @@ class Plant(RecordOwner):
         if robot.gears:
             mount_gears(robot, memory.model, memory.environment.friction, memory.x)
             check_springs(robot, positions, period / settings.substeps, settings.substeps)
-        self._look_into_blocks()
+        self._bind_views()
         # as `write_truth` does for joints at rest, without loading compiled code
         self.truth.quaternion[:] = memory.x[3:7]
         self.truth.joint_positions[:] = positions[:n]
@@ -170,7 +170,7 @@ class Plant(RecordOwner):
         self.memory.x[7 + n : 10 + n] = cross(centre.T, turn)[:, 0]
         self.memory.x[10 + n : 13 + n] = turn[:, 0]
 
-    def _look_into_blocks(self) -> None:
+    def _bind_views(self) -> None:
         self.truth = RobotState(0, self.block["truth"])
         """The true state at the current tick."""
         self.state = RobotState(0, self.block["measured"])
@@ -190,7 +190,7 @@ class Plant(RecordOwner):
         """Keep the memory in another ``block`` from now on, beside that of other flights."""
         block[:] = self.block
         tick, self.block = self.tick, block
-        self._look_into_blocks()
+        self._bind_views()
         self.state.tick = self.truth.tick = tick
 
     @property

@@ -152,7 +152,7 @@ def digests(flown: FlownFlight) -> dict[str, Any]:
     )
     groups: dict[str, list[bytes]] = {}
     for name, content in named.items():
-        groups.setdefault(group_of(name), []).append(content)
+        groups.setdefault(metric_group(name), []).append(content)
     edges = np.linspace(0, log.ticks, BLOCKS + 1).astype(int)
     parts = [short(*(numbers(c[a:b]) for c in columns.values()))[:4] for a, b in pairwise(edges)]
     whole = hashlib.sha256(b"".join([about.encode(), *named.values()])).hexdigest()
@@ -165,7 +165,7 @@ def digests(flown: FlownFlight) -> dict[str, Any]:
     }
 
 
-def group_of(name: str) -> str:
+def metric_group(name: str) -> str:
     """Return the group of a signal."""
     if name.startswith("measured."):
         return "measured"

@@ -34,7 +34,7 @@ from matrix.scenarios import (
     what_changed,
 )
 from space_robot import FlownFlight
-from space_robot.analysis.words import of_statistic
+from space_robot.analysis.words import with_statistic
 from space_robot.flight.batch import FlightBatch, batches
 from space_robot.flight.plan import Flight
 from space_robot_msgs_py.bag.reader import read_flight
@@ -224,7 +224,7 @@ def test_c_answers_it_alike(plan: Planned, flown: Get, tmp_path: Path) -> None:
 
 
 def rms_of(report: dict[str, Any]) -> dict[str, float]:
-    return of_statistic(report["metrics"], "rms_eq64")
+    return with_statistic(report["metrics"], "rms_eq64")
 
 
 def fly_graph(plan: Planned, folder: Path, expected: FlownFlight, *words: str) -> None:

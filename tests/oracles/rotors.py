@@ -79,7 +79,7 @@ def random_rotors(rng: np.random.Generator, robot: Robot, count: int) -> list[Ro
     return rotors
 
 
-def settings_of(rotors: Sequence[Rotor], **more: Any) -> WheelSettings:
+def flown_settings(rotors: Sequence[Rotor], **more: Any) -> WheelSettings:
     """The same wheels as the plant is told of them."""
     axes = [float(x) for rotor in rotors for x in rotor.axis]
     return WheelSettings(axes=axes, rotor_inertia=[rotor.spin for rotor in rotors], **more)

@@ -15,7 +15,7 @@ from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.bag.law_history import as_data, laws_of
 
 from ..analysed_log import AnalysedLog, PointingBudget
-from ..plotted import KINDS, quantities_of
+from ..plotted import KINDS, flown_quantities
 from ..words import flown
 from .base_torque import chatter, junctions
 from .overlay import (
@@ -150,7 +150,9 @@ class FigureSet:
 def _own_drawings(log: FlightLog) -> Iterator[tuple[str, Drawing]]:
     flight = AnalysedLog(log)
     for name, kind in KINDS.items() if log.ticks else ():
-        drawn = [q for _, q in quantities_of(flight, [name]) if q.is_drawn] if kind.figure else []
+        drawn = (
+            [q for _, q in flown_quantities(flight, [name]) if q.is_drawn] if kind.figure else []
+        )
         if drawn:
             yield kind.figure, Drawing.of(kind.caption, kind_figure(log, drawn))
         if any(quantity.are_pulses for quantity in drawn):

@@ -19,7 +19,7 @@ from ..analysed_log import AnalysedLog, PointingBudget
 from ..described import event_times
 from ..errors import AxisIndex
 from ..measure import column_definition, column_label
-from ..plotted import PlottedQuantity, quantities_of
+from ..plotted import PlottedQuantity, flown_quantities
 from ..torques import RippleSpectrum, ripple_spectrum
 from .base_torque import BaseTorque
 from .style import (
@@ -74,7 +74,7 @@ class FlightCurves(NamedTuple):
             latency = 1e3 * known if len(known) else None
         return cls(
             log.time,
-            [(kind, sized(quantity)) for kind, quantity in quantities_of(flight, DRAWN)],
+            [(kind, sized(quantity)) for kind, quantity in flown_quantities(flight, DRAWN)],
             BaseTorque.of(log) if flight.controls_base else None,
             latency,
             ripple,

@@ -20,7 +20,7 @@ from ..described import event_times
 from ..errors import attitude_angles, junction_ticks, relative_rate, tracking_error, waypoint_ticks
 from ..mission_plan import PlannedSegment
 from ..plotted import AXES as XYZ
-from ..plotted import PlottedQuantity, quantities_of
+from ..plotted import PlottedQuantity, flown_quantities
 from .style import (
     GREY,
     PAGE_WIDTH,
@@ -56,7 +56,7 @@ def desired_joints(log: FlightLog) -> Figure:
     Prismatic joints have a separate panel.
     """
     time, waypoints = log.time, waypoint_ticks(log)
-    panels = [quantity for _, quantity in quantities_of(AnalysedLog(log), ["positions"])]
+    panels = [quantity for _, quantity in flown_quantities(AnalysedLog(log), ["positions"])]
     figure = page(80.0 if len(panels) == 1 else 120.0)
     below = figure.subplots(len(panels), 1, sharex=True, squeeze=False)[:, 0]
     for axes, panel in zip(below, panels, strict=True):
@@ -79,7 +79,7 @@ def control_results(log: FlightLog, title: str) -> Figure:
     reached; vertical lines are captures and releases. Without base actuators the base's drift is
     shown instead of its error. The flight need not be complete.
     """
-    (_, attitude), *_ = quantities_of(AnalysedLog(log), ["attitude"])
+    (_, attitude), *_ = flown_quantities(AnalysedLog(log), ["attitude"])
     error, torque, time = tracking_error(log)[:, 3:], log.applied_torque, log.time
     moments = time[junction_ticks(log)[:MOST_JUNCTIONS]]
     rows = 3 if len(moments) else 2

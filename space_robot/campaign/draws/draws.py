@@ -85,7 +85,7 @@ class Draws:
                     with errors_at(f"{where} {_as_text(value)}"):
                         self._extreme(law, variable, value).check()
 
-    def flights_of_options(self) -> Iterator[tuple[str, Flight]]:
+    def option_flights(self) -> Iterator[tuple[str, Flight]]:
         """Yield a description and the flight of each extreme value of each varied option."""
         for variable in self._variables:
             if variable.group == "scenario":

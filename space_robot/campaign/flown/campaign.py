@@ -21,7 +21,7 @@ from space_robot_msgs_py.config.validation import short, validate
 from space_robot_msgs_py.config.yaml_text import read_file
 from space_robot_msgs_py.errors import InputError
 
-from ...analysis.own_metric import SESSION, MetricFunction, check_names, text_of
+from ...analysis.own_metric import SESSION, MetricFunction, check_names, importable_text
 from ...console.progress import check_progress, rated_progress
 from ...processes.executor import connected, cores, is_daemonic, start_fork_server
 from ...processes.scratch_folder import ScratchFolder
@@ -210,7 +210,9 @@ def _with_metrics(study: Study, metrics: Mapping[str, MetricFunction | str]) -> 
         if name in study.metrics:
             raise InputError(f"{study.where}: metrics: {name} is defined twice")
         check_names([name])
-        study = study.model_copy(update={"metrics": {**study.metrics, name: text_of(function)}})
+        study = study.model_copy(
+            update={"metrics": {**study.metrics, name: importable_text(function)}}
+        )
     return study
 
 

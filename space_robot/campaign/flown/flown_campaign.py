@@ -145,10 +145,10 @@ class FlownCampaign:
         law = one_of(law or self.study.laws[0], self.study.laws, "law")
         return self._flyer.draws.scenario(as_whole_number(run, "run", 0, self.runs - 1), law)
 
-    def row_of(self, flight: FlownFlight, run: int, law: str) -> DataFrame:
+    def row_with(self, flight: FlownFlight, run: int, law: str) -> DataFrame:
         """Return a flight as a row of this campaign's table, to be appended to it.
 
-            found.scenario(3).bench() ... found.row_of(bench.flown(), run=3, law="by hand")
+            found.scenario(3).bench() ... found.row_with(bench.flown(), run=3, law="by hand")
 
         ``run`` is the one whose draws it flew, ``law`` its name in that column.
 
@@ -255,7 +255,7 @@ class Rerun(FlownFlight):
         flown: FlownFlight,
         task: Task,
         digest: str,
-        digest_of_row: str,
+        row_digest: str,
         other_software: Sequence[str],
     ) -> None:
         """Store a flight with its digest, that of its row (empty: not flown), and differences.
@@ -263,20 +263,20 @@ class Rerun(FlownFlight):
         ``other_software``: differences from the software that flew the campaign.
         """
         super().__init__(flown.flight, flown.ending, flown.bag, flown.log)
-        self.task, self.digest, self.digest_of_row = task, digest, digest_of_row
+        self.task, self.digest, self.row_digest = task, digest, row_digest
         self._other_software = other_software
 
     @property
     def is_same(self) -> bool:
         """True if flight and row have the same digest: then they are equal bit for bit."""
-        return self.digest == self.digest_of_row
+        return self.digest == self.row_digest
 
     @property
     def verdict(self) -> str:
         """Result of the comparison in a line."""
         if self.is_same:
             return f"same digest as the row: {self.digest}"
-        if not self.digest_of_row:
+        if not self.row_digest:
             return "the row has no digest: its flight was refused, killed or out of time"
         why = "; ".join(self._other_software) or "the software is the same, check the machine"
-        return f"digest {self.digest} differs from the row's {self.digest_of_row} ({why})"
+        return f"digest {self.digest} differs from the row's {self.row_digest} ({why})"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
 from typing import Annotated, Any
@@ -17,6 +17,7 @@ from space_robot_msgs_py.errors import InputError
 
 from ...flight.plan import Flight
 from ...processes.software import versions
+from ...scenario.recorded import differences
 from ..row.row import Columns
 from ..study import NOT_TO_BE_EXTENDED
 
@@ -71,22 +72,6 @@ class Manifest(StrictModel):
             raise InputError(f"{begun}, and a {design} design cannot be extended: {NEW_FOLDER}")
         if self.study.get("fixed_runs"):
             raise InputError(f"{begun}, but its file has fixed_runs: true: {NEW_FOLDER}")
-
-
-def differences(before: Any, now: Any, key: str = "") -> Iterator[tuple[str, Any, Any]]:
-    """Yield the keys whose values differ, with both values; None for a missing one.
-
-    The order of the variables (``vary``) is compared, too: the draws depend on it.
-    """
-    if isinstance(before, Mapping) and isinstance(now, Mapping):
-        for name in dict.fromkeys((*before, *now)):
-            inner = f"{key}.{name}" if key else str(name)
-            yield from differences(before.get(name), now.get(name), inner)
-        is_ordered = key.rpartition(".")[2] == "vary"
-        if is_ordered and list(before) != list(now) and sorted(before) == sorted(now):
-            yield f"order of {key}", ", ".join(before), ", ".join(now)
-    elif before != now:
-        yield key, before, now
 
 
 @cache

@@ -10,7 +10,7 @@ from space_robot_msgs_py.config.arguments import as_whole_number
 from space_robot_msgs_py.config.text import printable
 from space_robot_msgs_py.errors import FlightError, InputError
 
-from ...analysis.own_metric import check_names, function_of, of_mapping
+from ...analysis.own_metric import check_names, listed_metrics, metric_function
 from ...flight.batch import batch_obstacle
 from ...flight.compilation import compile_kernels, compile_lanes
 from ...flight.plan import Flight
@@ -64,13 +64,13 @@ class Preparation:
         try:  # they have columns of their own
             check_names(own)
             for text in own.values():
-                function_of(text)
+                metric_function(text)
         except InputError as error:
             raise InputError(f"{where}: metrics: {error}") from None
         for flight in flights:
             check_requirements(flight, self.study.require, where, own=own, budget=budget)
         if self.study.require:
-            for option, flight in self.flyer.draws.flights_of_options():
+            for option, flight in self.flyer.draws.option_flights():
                 check_requirements(flight, self.study.require, where, option, own, budget)
         study = self.study.content
         return Manifest(
@@ -114,7 +114,7 @@ class Preparation:
             log = simulate(self.flyer.draws.nominal(law).check())
         except FlightError:
             return
-        for metric in of_mapping(self.study.metrics):
+        for metric in listed_metrics(self.study.metrics):
             try:
                 metric.finite_value(log)
             except InputError as error:

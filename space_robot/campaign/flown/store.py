@@ -18,9 +18,10 @@ from space_robot_msgs_py.config.validation import short
 from space_robot_msgs_py.errors import InputError
 
 from ...console.files import atomic_file, make_folder
+from ...scenario.recorded import differences
 from ..row.row import Row, Task
 from ..study import read_study
-from .manifest import NEW_FOLDER, Manifest, differences
+from .manifest import NEW_FOLDER, Manifest
 
 DATABASE, STUDY, BAGS, LOCK = "campaign.sqlite", "study.yaml", "bags", ".lock"
 _TABLES = (

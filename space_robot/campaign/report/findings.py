@@ -17,10 +17,10 @@ from space_robot_msgs_py.config.validation import one_of, short
 from space_robot_msgs_py.errors import InputError
 
 from ...analysis.measure import Window, describe, label
+from ...scenario.recorded import differences
 from ..flown import FlownCampaign
 from ..flown.flights import is_narrow
 from ..flown.flown_campaign import needs_trust
-from ..flown.manifest import differences
 from ..study import Requirement, Study, short_names
 from ..verdicts.influences import Sensitivity, SobolIndices, sensitivity, sobol_indices
 from ..verdicts.laws import League, league

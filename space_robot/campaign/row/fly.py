@@ -11,7 +11,7 @@ from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.config.text import one_line_of
 from space_robot_msgs_py.errors import FlightError, InputError, SpaceRobotError
 
-from ...analysis.own_metric import MetricError, of_mapping
+from ...analysis.own_metric import MetricError, listed_metrics
 from ...flight.batch import FlightBatch, batches
 from ...flight.ending import FAILED, Ending
 from ...flight.plan import Flight
@@ -109,7 +109,7 @@ class RowFlyer:
         vary = self.draws.values(task.run)
         row = Row(task, ending.outcome, ending.reason, ending.ended_at_s, vary)
         if ending.error is None:
-            study, own = self.study, of_mapping(self.study.metrics)
+            study, own = self.study, listed_metrics(self.study.metrics)
             measured = measure_row(log, flight.ticks, study.require, own, study.pointing)
             row = replace(row, **measured._asdict())
         return row.digested(flight.plant.truth.block.tobytes())

@@ -14,7 +14,7 @@ from space_robot_msgs_py.config.validation import one_of
 from space_robot_msgs_py.errors import InputError
 
 from ...analysis.analysed_log import AnalysedLog, PointingBudget
-from ...analysis.measure import Window, evaluate, group_of, names
+from ...analysis.measure import Window, evaluate, metric_group, names
 from ...analysis.own_metric import OwnMetric
 from ...analysis.pointing import lacking_for_jitter
 from ...analysis.series import GROUPS, SeriesGroup
@@ -88,7 +88,7 @@ def needs_truth_only(flights: Iterable[Flight], require: Iterable[Requirement]) 
     plants = [flight.plant_settings for flight in flights]
     if any(plant.base_torque_limit or plant.joint_torque_limit for plant in plants):
         return False
-    groups = (group_of(demand.metric) for demand in require)
+    groups = (metric_group(demand.metric) for demand in require)
     return not any(group and group.name in MESSAGE_GROUPS for group in groups)
 
 

@@ -74,7 +74,7 @@ def node_server() -> ForkServer:
 @cache
 def _server_for(pid: int) -> ForkServer:
     """A process that is itself forked must not share its parent's."""
-    server = ForkServer.of_module(__name__)
+    server = ForkServer.as_program(__name__)
     atexit.register(server.close)
     return server
 

@@ -210,7 +210,7 @@ ROWS.append({"segments": [MANY], "said": "at most 100"})
 ISS = {"orbital_elements": {"height": 420e3, "eccentricity": 0.0005, "inclination_deg": 51.64}}
 
 
-def robot_of(name: str | int) -> Robot:
+def flown_robot(name: str | int) -> Robot:
     if isinstance(name, int):
         return random_robot(np.random.default_rng(name), name)
     own = DATA / name / "robot.yaml"
@@ -233,7 +233,7 @@ def as_text(value: Any) -> str:
 def test_a_mission_is_refused_in_one_line(row: dict[str, Any]) -> None:
     """InputError and Pydantic's ValidationError are both ValueErrors."""
     settings = {"joints_deg": AT} | row
-    robot, said = robot_of(settings.pop("robot", "paper")), settings.pop("said")
+    robot, said = flown_robot(settings.pop("robot", "paper")), settings.pop("said")
     if settings.pop("orbit", False):
         settings["assumed_orbit"] = ISS
     segments = [as_text(segment) for segment in settings.pop("segments", [])]

@@ -263,6 +263,15 @@ def test_analyze_reads_no_file_that_a_bag_names(
     assert "--trust" not in analyze(log)["unavailable"][figure]
 
 
+@pytest.mark.parametrize(
+    "mission", [{"segments": ["{file: secret.csv}"]}, {"events": ["capture@1:secret.yaml"]}]
+)
+def test_analyze_reads_no_file_of_a_mission(bag: Path, mission: dict[str, Any]) -> None:
+    log = read_flight(bag)
+    log.flight["scenario"]["mission"] |= mission
+    assert "read only with --trust" in analyze(log)["unavailable"]["end_effector"]
+
+
 def test_gains_of_a_swap_must_be_in_the_bag() -> None:
     flight = described(swaps=["0.1:ctc"])
     gains = flight["scenario"]["gains"].pop("ctc")

@@ -19,7 +19,7 @@ from space_robot.analysis import analyze, measure
 from space_robot.analysis.actuation import standing
 from space_robot.analysis.analysed_log import AnalysedLog
 from space_robot.analysis.report_tables import sizing_table
-from space_robot.analysis.words import of_statistic, remarks, warnings
+from space_robot.analysis.words import remarks, warnings, with_statistic
 from space_robot_model.hardware.base_actuators import BaseActuatorSettings
 from space_robot_model.robot import Robot
 from space_robot_model.robot.find import find_robot
@@ -255,7 +255,7 @@ def test_joints_beyond_their_limits_are_said() -> None:
     log.flight["robot_file"] = joints
     log.joint_positions[:], log.joint_velocities[:], log.applied_torque[:] = 3.0, -2.0, 60.0
     report = analyze(log)
-    beyond = of_statistic(report["metrics"], "beyond_effort")
+    beyond = with_statistic(report["metrics"], "beyond_effort")
     assert list(beyond) == ["joint1", "joint2", "joint3"]
     assert not [text for text in remarks(report) if "beyond" in text]
     log.applied_torque[:7, 4] = -60.1

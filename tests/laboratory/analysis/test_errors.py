@@ -20,7 +20,12 @@ from space_robot.analysis import analyze, excerpt, tracking_error
 from space_robot.analysis.actuation import settling
 from space_robot.analysis.analysed_log import AnalysedLog
 from space_robot.analysis.errors import junction_ticks, neglected_force, waypoint_ticks
-from space_robot.analysis.estimate_error import PairFilter, errors_of, recorded_h_bar, smoothing_of
+from space_robot.analysis.estimate_error import (
+    PairFilter,
+    estimate_errors,
+    law_smoothing,
+    recorded_h_bar,
+)
 from space_robot.analysis.report_tables import comparison_table, rms_table
 from space_robot.flight.flown_log import empty_log
 from space_robot.flight.plan import Flight, resolve
@@ -155,7 +160,7 @@ def noisy() -> FlightLog:
 
 
 def estimate_error(log: FlightLog, h_bar: Array) -> Array:
-    errors = errors_of(log, lambda log: h_bar, 0.0, rest=log.first_tick == 0)(0, log.ticks)
+    errors = estimate_errors(log, lambda log: h_bar, 0.0, rest=log.first_tick == 0)(0, log.ticks)
     assert np.isnan(errors[[0, -1]]).all()
     return errors[~np.isnan(errors).any(axis=1)]
 
@@ -172,7 +177,7 @@ def test_the_estimate_is_the_controllers(options: dict[str, Any]) -> None:
     log = flown(**options)
     assert log.telemetry is not None
     neglected = neglected_force(log, recorded_h_bar(log))
-    estimate = PairFilter(smoothing_of(log)).of(0, neglected)
+    estimate = PairFilter(law_smoothing(log)).of(0, neglected)
     expected = log.telemetry[1:, 2]
     np.testing.assert_allclose(estimate, expected, rtol=1e-9, atol=1e-9)
     assert np.ptp(expected, axis=0).min() > 1e-3

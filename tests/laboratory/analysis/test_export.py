@@ -25,7 +25,14 @@ from space_robot.analysis.export import (
     write_csv,
     write_parquet,
 )
-from space_robot.analysis.own_metric import SESSION, call, check_names, function_of, parse, text_of
+from space_robot.analysis.own_metric import (
+    SESSION,
+    call,
+    check_names,
+    importable_text,
+    metric_function,
+    parse,
+)
 from space_robot.analysis.report import render
 from space_robot.cli.main import cli
 from space_robot.console.files import atomic_file
@@ -218,25 +225,25 @@ def outside(log: FlightLog) -> float:
 
 def test_functions_that_no_other_process_can_import_are_of_the_session() -> None:
     here = f"{__name__}:outside"
-    assert text_of(outside) == here
-    assert function_of(here) is outside
+    assert importable_text(outside) == here
+    assert metric_function(here) is outside
 
     def inside(log: FlightLog) -> float:
         return 1.0
 
     for function in (inside, lambda log: 2.0, functools.partial(call, what="x")):
-        text = text_of(function)
+        text = importable_text(function)
         assert text.startswith(SESSION)
-        assert text_of(function) == text, "once"
-        assert function_of(text) is function
+        assert importable_text(function) == text, "once"
+        assert metric_function(text) is function
     with pytest.raises(InputError, match="of another Python session"):
-        function_of("session:overshoot#99")
+        metric_function("session:overshoot#99")
 
 
 def test_names_and_what_is_no_function() -> None:
     for wrong in (3, None, int, np.zeros(3)):
         with pytest.raises(InputError, match=r"a function or file\.py:FUNCTION was expected"):
-            text_of(wrong)
+            importable_text(wrong)
     assert parse("math:fsum").name == "fsum"
     check_names(["a", "b_2"])
     with pytest.raises(InputError, match=r"attitude\.rms' is no name of a metric"):

@@ -45,7 +45,7 @@ from space_robot.analysis.figures.base_torque import (
 from space_robot.analysis.figures.figure_set import FigureSet
 from space_robot.analysis.figures.overlay import FlightCurves, base_pointing
 from space_robot.analysis.figures.style import LineStyle, house_style, thinned
-from space_robot.analysis.plotted import PlottedQuantity, quantities_of
+from space_robot.analysis.plotted import PlottedQuantity, flown_quantities
 from space_robot_control.guidance.mission import Mission, MissionSettings
 from space_robot_model.hardware.base_actuators import BaseActuatorSettings
 from space_robot_model.robot import Robot
@@ -340,7 +340,7 @@ def lively_log(robot: Robot, actuators: BaseActuatorSettings, ticks: int = 50) -
 
 def figure_of(log: FlightLog, kind: str) -> tuple[Figure, list[PlottedQuantity]]:
     """The figure of a kind, and the quantities on it."""
-    found = [q for _, q in quantities_of(AnalysedLog(log), [kind]) if q.is_drawn]
+    found = [q for _, q in flown_quantities(AnalysedLog(log), [kind]) if q.is_drawn]
     return kind_figure(log, found), found
 
 

@@ -20,14 +20,14 @@ from strategies import random_log
 from space_robot import Scenario
 from space_robot.analysis import Window, analyze, describe, measure, tracking_error
 from space_robot.analysis.analysed_log import AnalysedLog
-from space_robot.analysis.described import robot_of
+from space_robot.analysis.described import flown_robot
 from space_robot.analysis.errors import (
     attitude_angles,
     attitude_drift,
     axis_groups,
     controls_base,
-    quaternions_of,
     rotation_vectors,
+    unit_quaternions,
 )
 from space_robot.analysis.figures import ripple
 from space_robot.analysis.figures.overlay import FlightCurves
@@ -35,7 +35,7 @@ from space_robot.analysis.figures.style import LineStyle
 from space_robot.analysis.measure import all_metrics, label, names
 from space_robot.analysis.report_tables import comparison_table, rms_table
 from space_robot.analysis.torques import desired_torque, hann, ripple_spectrum, segment_spectra
-from space_robot.analysis.words import notes, of_statistic, remarks
+from space_robot.analysis.words import notes, remarks, with_statistic
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.samples import Timebase
@@ -207,7 +207,7 @@ def test_the_angles_are_those_of_the_rotation_from_the_desired_attitude(attitude
         np.testing.assert_allclose(found, -expected, atol=1e-11)
         np.testing.assert_allclose(vector, -quaternion[:3], atol=1e-15)
         if np.linalg.norm(vector) < 0.9:
-            (turned_by,) = np.degrees(rotation_vectors(quaternions_of(vector[np.newaxis])))
+            (turned_by,) = np.degrees(rotation_vectors(unit_quaternions(vector[np.newaxis])))
             np.testing.assert_allclose(turned_by, -expected, atol=1e-11)
 
 
@@ -248,10 +248,10 @@ def test_a_free_base_has_drift_and_no_error_and_no_torque() -> None:
     report, of_held = analyze(log), analyze(held)
     columns = {"joints_1_3", "joints_4_6"} | TORQUES
     free, fixed = report["metrics"], of_held["metrics"]
-    assert of_statistic(free, "rms_eq64").keys() == columns
+    assert with_statistic(free, "rms_eq64").keys() == columns
     for statistic in ("variation", "chatter", "rms_eq64"):
-        assert of_statistic(fixed, statistic).items() > of_statistic(free, statistic).items()
-    assert of_statistic(free, "chatter").keys() == TORQUES
+        assert with_statistic(fixed, statistic).items() > with_statistic(free, statistic).items()
+    assert with_statistic(free, "chatter").keys() == TORQUES
     assert not [name for name in fixed if name.startswith("attitude_drift")]
     estimate = {name for name in free if name.startswith("estimate_error")}
     assert estimate == {f"estimate_error_{g}.{s}" for g in ("1_3", "4_6") for s in ("rms", "max")}
@@ -280,7 +280,7 @@ TIME = np.arange(16_000)[:, np.newaxis] * PERIOD
 def desired() -> FlightLog:
     """A flight whose torque is what the reference asks for."""
     log = Scenario(duration=8.0, controller="ctc").fly().log
-    log.applied_torque = desired_torque(log, robot_of(log))
+    log.applied_torque = desired_torque(log, flown_robot(log))
     return log
 
 
@@ -296,7 +296,7 @@ def ripple_of(log: FlightLog) -> dict[str, float]:
 
 
 def lasting_of(log: FlightLog) -> dict[str, float]:
-    return of_statistic(measure(log), "ripple_lasting")
+    return with_statistic(measure(log), "ripple_lasting")
 
 
 def test_of_a_sine_it_is_its_rms_at_its_frequency(desired: FlightLog) -> None:
@@ -319,7 +319,7 @@ def test_of_a_sine_it_is_its_rms_at_its_frequency(desired: FlightLog) -> None:
     log.reference_base[:, :4] *= -2.0  # nor does its length matter
     assert ripple_of(log) == found
     short = analyze(log.rows(0, 1_999))
-    assert not of_statistic(short["metrics"], "ripple")
+    assert not with_statistic(short["metrics"], "ripple")
     assert short["unavailable"]["ripple"] == "1 s of flight are needed"
 
 
@@ -338,7 +338,7 @@ def test_a_burst_does_not_last(desired: FlightLog) -> None:
     assert not lasting_of(with_torque(desired, burst[:9_999]))
     none = ripple_of(with_torque(desired, np.zeros((2_000, 9))))
     assert set(none.values()) == {0.0}
-    assert not of_statistic(none, "ripple_peak")
+    assert not with_statistic(none, "ripple_peak")
 
 
 def test_slow_torque_is_none_and_white_noise_has_all_but_its_slow_part(desired: FlightLog) -> None:

@@ -22,7 +22,7 @@ from scipy.integrate import solve_ivp
 from space_robot import Scenario
 from space_robot.analysis import analyze, measure
 from space_robot.analysis.analysed_log import AnalysedLog
-from space_robot.analysis.momentum import MomentumSeries, momentum_of
+from space_robot.analysis.momentum import MomentumSeries, whole_momentum
 from space_robot.analysis.report_tables import comparison_table
 from space_robot.analysis.words import analyzed
 from space_robot_model.hardware.base_actuators import BaseActuatorSettings
@@ -169,7 +169,7 @@ def test_dipoles_are_accounted_for_to_rounding() -> None:
     The torquers' torque is what the base is applied beyond its wheels' motors.
     """
     log = TORQUED.replace(orbit=FIELD).fly().log
-    momentum = momentum_of(log)
+    momentum = whole_momentum(log)
     rest = momentum.total - momentum.total[0] - momentum.outside
     size = np.linalg.norm(momentum.wheels, axis=1).max()
     assert size > 10.0

@@ -18,8 +18,8 @@ from strategies import random_log
 from space_robot import Scenario
 from space_robot.analysis import analyze, describe, measure
 from space_robot.analysis.actuation import deflection
-from space_robot.analysis.described import NotDescribedError, plant_settings, robot_of
-from space_robot.analysis.momentum import momentum_of
+from space_robot.analysis.described import NotDescribedError, flown_robot, plant_settings
+from space_robot.analysis.momentum import whole_momentum
 from space_robot.analysis.report_tables import comparison_table, metrics_table, rms_table
 from space_robot.console.tables import NONE, Table
 from space_robot_model.robot.gears import geared_joints
@@ -168,7 +168,7 @@ def test_on_orbit_and_with_gears_there_are_more_rows(driven: FlightLog) -> None:
 
 
 def test_robot_and_orbit_are_those_that_flew(driven: FlightLog) -> None:
-    robot, orbit = robot_of(driven), plant_settings(driven)
+    robot, orbit = flown_robot(driven), plant_settings(driven)
     assert geared_joints(robot) == [1, 2, 4]
     assert robot.geared_names == driven.geared_names == ("joint2", "joint3", "joint5")
     assert [plate.area for plate in robot.plates] == [plate["area"] for plate in PLATES]
@@ -178,11 +178,11 @@ def test_robot_and_orbit_are_those_that_flew(driven: FlightLog) -> None:
 
 def test_motors_that_the_robot_has_not_are_told(driven: FlightLog) -> None:
     """Their momentum would be left out, or that of another joint."""
-    momentum_of(driven)
+    whole_momentum(driven)
     velocities = driven.motor_velocities[:, :1]
     other = replace(driven, geared_names=("joint2",), motor_velocities=velocities)
     with pytest.raises(NotDescribedError, match="has gears in the joints joint2, joint3, joint5"):
-        momentum_of(other)
+        whole_momentum(other)
 
 
 def test_a_file_that_a_bag_names_is_not_read(driven: FlightLog) -> None:

@@ -126,13 +126,13 @@ def test_any_row_flies_again_to_the_same_bits(undisturbed: FlownCampaign) -> Non
 def test_a_flight_by_hand_is_a_row_beside_the_tables(undisturbed: FlownCampaign) -> None:
     """To be appended: the draws of its run, its own law's name, the same digest."""
     flown = undisturbed.scenario(3, "tde_stc").fly()
-    row, ours = undisturbed.row_of(flown, 3, "by hand"), undisturbed.table.iloc[6]
+    row, ours = undisturbed.row_with(flown, 3, "by hand"), undisturbed.table.iloc[6]
     assert list(row.columns) == list(undisturbed.table.columns)
     assert (row["run"][0], row["law"][0], row["digest"][0]) == (3, "by hand", ours["digest"])
     assert row["vary.scenario.sensors"][0] == ours["vary.scenario.sensors"]
     other = Scenario(actuators="none", controller="ctc", duration=0.2).fly()
     with pytest.raises(InputError, match=r"attitude_drift\.max, which is no column of"):
-        undisturbed.row_of(other, 3, "by hand")
+        undisturbed.row_with(other, 3, "by hand")
 
 
 def test_a_flight_whose_worker_died_is_a_row_and_is_tried_again(

@@ -21,7 +21,7 @@ pytest.importorskip("pyarrow")
 FILE = """
 import numpy as np
 
-from space_robot.analysis.described import robot_of
+from space_robot.analysis.described import flown_robot
 
 
 def overshoot(log):
@@ -29,13 +29,13 @@ def overshoot(log):
 
 
 def heavy_fails(log):
-    if robot_of(log).mass[0] > 760.0:
+    if flown_robot(log).mass[0] > 760.0:
         raise ValueError("too heavy")
     return 1.0
 
 
 def heavy_is_nan(log):
-    return float("nan") if robot_of(log).mass[0] > 760.0 else 1.0
+    return float("nan") if flown_robot(log).mass[0] > 760.0 else 1.0
 
 
 def nan(log):

@@ -20,7 +20,7 @@ from scene_pages import Scene, plot_data
 
 from space_robot.analysis import analyze as report_of
 from space_robot.analysis import excerpt
-from space_robot.analysis.described import robot_of
+from space_robot.analysis.described import flown_robot
 from space_robot.cli.main import main
 from space_robot.flight.plan import Flight, Scenario, resolve
 from space_robot.flight.simulate import simulate
@@ -161,7 +161,7 @@ def test_a_bag_has_the_shapes_of_its_urdf(view: Run, tmp_path: Path) -> None:
         assert hint not in shown.err
         assert drawn(tmp_path / f"{name}.html") == SHAPES
     log = read_flight(tmp_path / "flown")
-    assert shown_robot(log, str(urdf)).springs == robot_of(log).springs != ()
+    assert shown_robot(log, str(urdf)).springs == flown_robot(log).springs != ()
 
 
 def test_a_live_view_without_ros_ends_with_one_line(

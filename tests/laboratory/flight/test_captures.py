@@ -120,7 +120,7 @@ def target(without: FlightLog) -> Target:
     return meeting_target(ORBIT, 0.1, place, **motion)
 
 
-def events_of(target: Target, distance: float = 0.0) -> list[str]:
+def flown_events(target: Target, distance: float = 0.0) -> list[str]:
     """Capture of a target that passes the given one at a distance, m, and its release."""
     start = np.array(target.motion.position) + distance * np.array([2.0, -1.0, 2.0]) / 3.0
     motion = target.motion.model_copy(update={"position": start.tolist()})
@@ -138,7 +138,7 @@ def test_what_is_met_is_counted_by_the_analysis(
     without: FlightLog, target: Target, tmp_path: Path
 ) -> None:
     """Nothing else is left of the momentum."""
-    log = flown(tmp_path / "bag", orbit=ORBIT, events=events_of(target))
+    log = flown(tmp_path / "bag", orbit=ORBIT, events=flown_events(target))
     assert np.abs(log.omega_base[CAPTURE] - without.omega_base[CAPTURE]).max() > 1e-3
     recorded = read_flight(tmp_path / "bag")
     for flight in (log, recorded):
@@ -148,14 +148,16 @@ def test_what_is_met_is_counted_by_the_analysis(
         assert report["metrics"]["momentum_outside.max"] > 1.0
         assert report["metrics"]["momentum_drift.relative"] < 1e-11
     faster = target.motion.model_copy(update={"velocity": [0.2, -0.1, 0.2]})
-    recorded.flight["scenario"]["events"] = events_of(target.model_copy(update={"motion": faster}))
+    recorded.flight["scenario"]["events"] = flown_events(
+        target.model_copy(update={"motion": faster})
+    )
     assert analyze(recorded)["metrics"]["momentum_drift.relative"] > 1e-3
 
 
 def test_what_is_missed_leaves_every_bit_and_is_reported(
     without: FlightLog, target: Target, tmp_path: Path
 ) -> None:
-    log = flown(tmp_path / "bag", orbit=ORBIT, events=events_of(target, 0.25))
+    log = flown(tmp_path / "bag", orbit=ORBIT, events=flown_events(target, 0.25))
     for name, column in without.columns.items():
         assert log.columns[name].tobytes() == column.tobytes(), name
     for flight in (log, read_flight(tmp_path / "bag")):
@@ -167,7 +169,7 @@ def test_what_is_missed_leaves_every_bit_and_is_reported(
     plain = analyze(without)
     assert report["metrics"] == {**plain["metrics"], **missed_in(report)}
     assert report["sizing"] == plain["sizing"]
-    short = flown(orbit=ORBIT, events=events_of(target, 0.25), duration=0.05)
+    short = flown(orbit=ORBIT, events=flown_events(target, 0.25), duration=0.05)
     assert not missed_in(analyze(short))
 
 

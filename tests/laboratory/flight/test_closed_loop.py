@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from space_robot import Robot, Scenario
 from space_robot.analysis import analyze
 from space_robot.analysis.errors import tracking_error
-from space_robot.analysis.words import of_statistic
+from space_robot.analysis.words import with_statistic
 from space_robot.flight.simulate import simulate
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.bag.flight_log import FlightLog
@@ -70,7 +70,7 @@ def mission(duration: float | None = None, **plant: Any) -> FlightLog:
     return simulated(duration=duration, parameters={"plant": plant})
 
 
-def errors_of(log: FlightLog) -> Array:
+def estimate_errors(log: FlightLog) -> Array:
     """Mean-axis RMS of attitude (vector part), joints 1-3 and 4-6."""
     rms = np.sqrt(np.mean(tracking_error(log) ** 2, axis=0))
     return rms.reshape(3, 3).mean(axis=1)
@@ -84,18 +84,18 @@ def variation_of_joint_6(log: FlightLog) -> float:
 def test_the_mission_of_the_paper_has_its_figures() -> None:
     """TDE-STC, case 1, Table IV; joints 4 to 6 as with a plant of 256 steps a tick."""
     log = mission()
-    rms = of_statistic(analyze(log)["metrics"], "rms")
+    rms = with_statistic(analyze(log)["metrics"], "rms")
     assert log.ticks == 60_000
     assert max(rms["attitude"], rms["joints_1_3"], rms["joints_4_6"]) < 1e-7
     wanted = {"base_torque": 0.7996, "torque_1_3": 0.9304, "torque_4_6": 0.0526}
     assert {name: rms[name] for name in wanted} == pytest.approx(wanted, rel=0.005)
-    assert errors_of(log)[2] == pytest.approx(1.14e-8, rel=0.05)
+    assert estimate_errors(log)[2] == pytest.approx(1.14e-8, rel=0.05)
     assert 0.005 / 3.0 < variation_of_joint_6(log) < 0.015
 
 
 def test_the_sign_inside_the_step_chatters() -> None:
     log = mission(**{"friction.set_valued": False})
-    assert errors_of(log)[2] == pytest.approx(3.46e-8, rel=0.01)
+    assert estimate_errors(log)[2] == pytest.approx(3.46e-8, rel=0.01)
     assert variation_of_joint_6(log) == pytest.approx(1.601, rel=0.01)
 
 
@@ -143,7 +143,7 @@ def attitude_rms(law: str, gains: dict[str, Any], scale: float) -> float:
     """Of a flight of case 1 whose torque is reported with a factor."""
     parameters = {"plant": {"echo_scale": [scale]}}
     log = simulate(Scenario(controller=law, gains=gains, parameters=parameters).check())
-    return float(errors_of(log)[0])
+    return float(estimate_errors(log)[0])
 
 
 def test_estimates_with_the_nominal_inertia_bear_a_wrong_torque_report() -> None:

@@ -15,13 +15,13 @@ from strategies import with_gears
 
 import space_robot as sr
 from space_robot.analysis import analyze, measure
-from space_robot.analysis.described import robot_of
+from space_robot.analysis.described import flown_robot
 from space_robot.analysis.export import column_names
 from space_robot.analysis.figures.single_flight import control_results
 from space_robot.analysis.measure import describe
-from space_robot.analysis.momentum import momentum_of
+from space_robot.analysis.momentum import whole_momentum
 from space_robot.analysis.report_tables import rms_table
-from space_robot.analysis.words import of_statistic
+from space_robot.analysis.words import with_statistic
 from space_robot.flight.batch import batches
 from space_robot.flight.simulate import simulate
 from space_robot_model.robot import Robot
@@ -43,7 +43,7 @@ def bent(tmp_path_factory: pytest.TempPathFactory) -> FlightLog:
     recorded = read_flight(bag)
     assert recorded.passive_names == ("panel_root", "panel_tip", "slosh")
     assert recorded.prismatic == log.prismatic == (*[False, True], *[False] * 6, True)
-    assert robot_of(recorded).nominal.joint_names == log.joint_names
+    assert flown_robot(recorded).nominal.joint_names == log.joint_names
     assert json.loads(json.dumps(analyze(recorded))) == json.loads(json.dumps(analyze(log)))
     return log
 
@@ -75,9 +75,9 @@ def test_errors_and_forces_are_told_by_kind(bent: FlightLog) -> None:
     report = analyze(bent)
     kinds = ("revolute", "prismatic")
     columns = {"attitude", "base_torque", "torque_revolute", "force_prismatic"}
-    found = of_statistic(report["metrics"], "rms_eq64")
+    found = with_statistic(report["metrics"], "rms_eq64")
     assert found.keys() == columns | {"attitude_angle"} | {f"joints_{kind}" for kind in kinds}
-    found = of_statistic(report["metrics"], "rms")
+    found = with_statistic(report["metrics"], "rms")
     table = [row[1] for group in rms_table(report).groups for row in group.rows]
     assert table == ["deg", "rad", "m", "N m", "N m", "N"]
     error = bent.reference_joints[:, 0] - bent.joint_positions
@@ -96,7 +96,7 @@ def test_errors_and_forces_are_told_by_kind(bent: FlightLog) -> None:
 
 def test_momentum_and_tool_are_those_of_the_whole_robot(bent: FlightLog) -> None:
     """As the inertia matrix has the momentum; a panel that bends moves what the base carries."""
-    robot, tick = robot_of(bent), bent.ticks - 1
+    robot, tick = flown_robot(bent), bent.ticks - 1
     row = slice(tick, tick + 1)
     motion = Motion(
         bent.quaternion[row],
@@ -155,7 +155,7 @@ def test_a_log_has_motors_and_what_is_measured_of_them(robot: Robot, tmp_path: P
     assert np.abs(motors.mean(axis=0)).max() < noise
     recorded = read_flight(tmp_path / "bag", trust=True)
     assert not recorded.damage
-    assert robot_of(recorded).gears == robot.gears
+    assert flown_robot(recorded).gears == robot.gears
     assert analyze(recorded) == analyze(log)
 
 
@@ -172,7 +172,7 @@ def test_the_analysis_counts_the_motors_and_finds_momentum_conserved(
     and is 5e-11 with those of 500 us.
     """
     log = simulate(scenario(robot, substeps=4, **options).check())
-    momentum = momentum_of(log)
+    momentum = whole_momentum(log)
     expected = motor_momentum(robot, log.quaternion, log.joint_positions, log.motor_velocities)
     np.testing.assert_array_equal(momentum.motors, expected)
     exchanged = np.linalg.norm(momentum.base, axis=1).max()

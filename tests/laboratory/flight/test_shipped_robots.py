@@ -11,7 +11,7 @@ from flights import simulated
 from paths import CONFIG
 
 from space_robot.analysis import analyze
-from space_robot.analysis.words import of_statistic, remarks
+from space_robot.analysis.words import remarks, with_statistic
 from space_robot.cli.main import cli
 from space_robot_control.laws import laws
 from space_robot_model.robot.find import robot_names
@@ -31,7 +31,7 @@ def test_every_law_flies_it(robot: str, law: str) -> None:
     log = simulated(robot=robot, controller=law, gains="tuned", duration=SECONDS)
     report = analyze(log)
     assert not [text for text in remarks(report) if "beyond" in text], "limits of its file"
-    rms = of_statistic(report["metrics"], "rms")
+    rms = with_statistic(report["metrics"], "rms")
     assert rms.pop("attitude") < ATTITUDE.get((robot, law), 1e-6)
     for name, value in rms.items():
         if name.startswith("joints"):

@@ -22,7 +22,7 @@ from strategies import random_tree
 from space_robot import Scenario
 from space_robot.analysis import excerpt
 from space_robot.analysis.analysed_log import AnalysedLog
-from space_robot.analysis.plotted import quantities_of
+from space_robot.analysis.plotted import flown_quantities
 from space_robot.view.animation import DESIRED, PIECES, ShownFlight, animate, trails
 from space_robot.view.flights import Mark, ViewOptions, flight_marks, shared_marks, shown_robot
 from space_robot.view.frames import MOST_FRAMES, Frames, shown_times
@@ -181,11 +181,13 @@ def test_the_tool_ends_at_its_goal_and_its_distance_from_the_path_is_plotted(flo
         np.testing.assert_allclose(goal.position, place, atol=1e-5)
         np.testing.assert_allclose(goal.rotation, rotation[0], atol=1e-4)
     assert np.linalg.norm(goals[-1].position - goals[0].position) > 0.07
-    (tool,) = [q for _, q in quantities_of(AnalysedLog(log), ["tool"]) if q.title == "tool error"]
+    (tool,) = [
+        q for _, q in flown_quantities(AnalysedLog(log), ["tool"]) if q.title == "tool error"
+    ]
     assert tool.values.max() == flight.metrics["tool.max"]
     plain = flown("paper")
     assert not any("/goal_" in name for name in Scene(page_of(robot, a=plain)).names())
-    assert "tool error" not in [q.title for _, q in quantities_of(AnalysedLog(plain), ["tool"])]
+    assert "tool error" not in [q.title for _, q in flown_quantities(AnalysedLog(plain), ["tool"])]
 
 
 @settings(max_examples=50)

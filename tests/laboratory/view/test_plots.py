@@ -16,7 +16,7 @@ from scene_pages import moving_log
 from scipy.spatial.transform import Rotation
 
 from space_robot.analysis.analysed_log import AnalysedLog
-from space_robot.analysis.plotted import PlottedQuantity, quantities_of
+from space_robot.analysis.plotted import PlottedQuantity, flown_quantities
 from space_robot.view.flights import STRETCHES, Plot, Series, extremes, flight_plots, render
 from space_robot_control.allocation.settings import assumed_actuators
 from space_robot_model.hardware.base_actuators import BaseActuatorSettings
@@ -68,7 +68,7 @@ def flight(robot: Robot, actuators: str) -> FlightLog:
 def plotted_of(log: FlightLog, robot: Robot) -> list[PlottedQuantity]:
     analysed = AnalysedLog(log)
     analysed.robot = robot
-    return [quantity for _, quantity in quantities_of(analysed)]
+    return [quantity for _, quantity in flown_quantities(analysed)]
 
 
 def shown_of(log: FlightLog, robot: Robot) -> dict[str, PlottedQuantity]:

@@ -87,7 +87,7 @@ def still_log(robot: Robot) -> FlightLog:
 
 
 def scene_of(log: FlightLog, robot: Robot, patch: pytest.MonkeyPatch, *events: Any) -> Scene:
-    patch.setattr(drawing, "events_of", lambda log: list(events))
+    patch.setattr(drawing, "flown_events", lambda log: list(events))
     return Scene(page_of(robot, ViewOptions(rate=10.0), one=log))
 
 

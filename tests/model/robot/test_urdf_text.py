@@ -185,7 +185,7 @@ def link_of(name: str, parent: str, joint: str) -> Body:
     )
 
 
-def robot_of(base: str, link: str, tool: str, visuals: Sequence[Visual] = ()) -> Robot:
+def flown_robot(base: str, link: str, tool: str, visuals: Sequence[Visual] = ()) -> Robot:
     """A base and a link on a joint called as it is."""
     tools = [Tool(tool, position=np.ones(3), link=link), Tool(tool, link=link)]
     hull, own = Base(9.0, np.eye(3), name=base), [replace(visual, link=link) for visual in visuals]
@@ -269,7 +269,7 @@ def test_meshes_are_told_by_addresses(tmp_path: Path) -> None:
         Visual("mesh", (1.0, 2.0, 0.5), np.eye(3), np.zeros(3), mesh=name)
         for name in (str(mesh), "package://gone/b.dae")
     )
-    text = urdf_text(robot_of("base", "wrist", "tool", visuals=shapes))
+    text = urdf_text(flown_robot("base", "wrist", "tool", visuals=shapes))
     meshes = [element.attrib for element in ElementTree.fromstring(text).iter("mesh")]
     assert meshes == [
         {"filename": f"file://{tmp_path}/a%20plate.stl", "scale": "1 2 0.5"},

@@ -10,7 +10,7 @@ import pytest
 
 from space_robot.analysis import analyze
 from space_robot.analysis.analysed_log import excerpt
-from space_robot.analysis.estimate_error import HBar, errors_of, recorded_h_bar
+from space_robot.analysis.estimate_error import HBar, estimate_errors, recorded_h_bar
 from space_robot.flight.plan import Flight, Scenario, resolve
 from space_robot.flight.replay.run import RecordedLaws
 from space_robot.flight.simulate import simulate
@@ -159,7 +159,7 @@ def test_the_estimates_error_is_taken_with_the_h_bar_in_force(swapped: FlightLog
     log = replace(swapped, laws=(*swapped.laws[:2], swapped.laws[2]._replace(gains=halved)))
 
     def errors(h_bar: HBar) -> np.ndarray:
-        return errors_of(log, h_bar, 0.3)(0, log.ticks)
+        return estimate_errors(log, h_bar, 0.3)(0, log.ticks)
 
     alone = [errors(lambda _, law=law: np.array(law.gains["h_bar"])) for law in log.laws[::2]]
     expected = np.vstack([alone[0][:200], np.full((200, 9), np.nan), alone[1][400:]])

@@ -12,7 +12,7 @@ import pytest
 from bags import FLIGHT, TIMEBASE, Recorded, messages_of, read_accounts, record
 
 from space_robot.analysis import analyze
-from space_robot.analysis.words import of_statistic
+from space_robot.analysis.words import with_statistic
 from space_robot.flight.plan import Flight, Scenario, resolve
 from space_robot.flight.simulate import simulate
 from space_robot_msgs_py import topics
@@ -183,7 +183,7 @@ def test_sensors_that_tell_the_truth_need_no_second_word(tmp_path: Path) -> None
 
 
 def rms_of(log: FlightLog) -> dict[str, float]:
-    return of_statistic(analyze(log)["metrics"], "rms_eq64")
+    return with_statistic(analyze(log)["metrics"], "rms_eq64")
 
 
 def test_half_a_truth_is_none(flown: tuple[FlightLog, Path], tmp_path: Path) -> None:

@@ -151,7 +151,7 @@ def beside(target: Target, distance: float) -> Target:
     return target.model_copy(update={"motion": motion})
 
 
-def events_of(target: Target) -> list[str]:
+def flown_events(target: Target) -> list[str]:
     return [f"capture@{CAPTURE * PERIOD}:{target.inline}", f"release@{RELEASE * PERIOD}:{SPEED}"]
 
 
@@ -159,7 +159,7 @@ def test_what_is_met_is_held_with_the_momenta_of_both(
     paper_robot: Robot, before: RobotState, target: Target
 ) -> None:
     """Linear and angular about the origin, to 1e-12; not with a velocity from elsewhere."""
-    plant = flying_plant(paper_robot, events_of(target))
+    plant = flying_plant(paper_robot, flown_events(target))
     after = coast(plant, CAPTURE)
     for name in ("base_position", "quaternion", "joint_positions"):
         np.testing.assert_array_equal(getattr(after, name), getattr(before, name))
@@ -197,7 +197,7 @@ def test_the_reach_is_the_largest_distance_and_what_is_missed_changes_no_bit(
     paper_robot: Robot, target: Target, distance: float, hits: bool
 ) -> None:
     """Nor does the release of what is not held."""
-    plant = flying_plant(paper_robot, events_of(beside(target, distance)))
+    plant = flying_plant(paper_robot, flown_events(beside(target, distance)))
     coast(plant, CAPTURE)
     assert bool(plant.captures.misses) is not hits
     held = target.mass if hits else 0.0

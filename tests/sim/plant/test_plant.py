@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from oracles import assert_close, rotation_of
 from oracles.momenta import kinetic_energy, momentum, state_of
-from oracles.rotors import RotorEquations, random_motor_rotors, random_rotors, settings_of
+from oracles.rotors import RotorEquations, flown_settings, random_motor_rotors, random_rotors
 from robots import ANGLES_DEG, LOCKED, NO_FRICTION, PERIOD, rigid_robot
 from strategies import random_gears, random_quaternion, random_robot, random_tree, with_gears
 
@@ -281,7 +281,7 @@ def test_a_capture_gives_no_wheel_and_no_rotor_a_momentum_of_its_own() -> None:
     for events in ([], [f"capture@{capture * PERIOD}:{target.inline}"]):
         plant = plant_of(
             robot,
-            wheels=settings_of(rotors, initial_speed=[20.0, -30.0, 40.0, 10.0]),
+            wheels=flown_settings(rotors, initial_speed=[20.0, -30.0, 40.0, 10.0]),
             base_actuation="hardware",
             substeps=2,
             events=events,
