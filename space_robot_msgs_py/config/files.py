@@ -63,12 +63,9 @@ def named_layers(kind: str, name: str) -> list[Path]:
 def node_parameters(path: Path, node: str, namespace: str = "/") -> Tree:
     """Read the parameters of a node from a ROS parameter file, as a tree.
 
-    They are below the keys ``/**``, the node's ROS name, or ``/**/`` and the name: ROS applies the
-    latter in any namespace, the name alone only in the root namespace; or below the name in the
-    node's own ``namespace``.
+    They are below ``/**``, the node's ROS name, ``/**/`` and it, or the name in ``namespace``.
     """
-    merged: Tree = {}
-    names = "**", f"{node}_node", f"{namespace.strip('/')}/{node}_node"
+    names, merged = ("**", f"{node}_node", f"{namespace.strip('/')}/{node}_node"), Tree()
     for name, content in read_yaml(path).items():
         if not isinstance(content, dict) or list(content) != ["ros__parameters"]:
             raise InputError(

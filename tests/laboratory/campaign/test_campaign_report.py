@@ -29,7 +29,7 @@ from space_robot.campaign.report.findings import Findings, Quantity
 from space_robot.campaign.report.tables import demand_text, number, verdict_table
 from space_robot.campaign.study import Requirement, Study
 from space_robot.campaign.verdicts.laws import league
-from space_robot.cli.campaign import name_of
+from space_robot.cli.campaign import campaign_name
 from space_robot.cli.campaign_display import medians
 from space_robot.cli.main import cli
 from space_robot_msgs_py.errors import InputError
@@ -175,8 +175,8 @@ def file(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_the_default_folder_is_named_by_the_file_or_by_its_folder() -> None:
-    assert name_of(Path("first")) == name_of(Path("some/first.yaml")) == "first"
-    assert name_of(Path("mine/campaign.yaml")) == "mine"
+    assert campaign_name(Path("first")) == campaign_name(Path("some/first.yaml")) == "first"
+    assert campaign_name(Path("mine/campaign.yaml")) == "mine"
 
 
 @pytest.fixture(scope="module")
