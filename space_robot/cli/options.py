@@ -181,10 +181,11 @@ def _use_scenario(
 
     from ..scenario.scenario import Scenario
 
-    own = {parameter.name for parameter in context.command.params} - {"scenario", "help"}
+    names = (parameter.name for parameter in context.command.params)
+    own = [name for name in names if name and name not in ("scenario", "help")]
     content = {k: v for k, v in read_yaml(path).items() if k in own or k not in ignored}
     for key, value in content.items():
-        one_of(key, own, "key", f" in {path}")
+        one_of(key, [*own, *ignored], "key", f" in {path}")
         is_text = isinstance(value, (str, int, float)) and "\0" not in str(value)
         if key not in Scenario.model_fields and not is_text:
             raise InputError(f"{path}: {key}: a text was expected, got {short(value)}")
