@@ -261,12 +261,11 @@ def _in_processes(
                     yield Done(worker.item, None, WorkerDiedError("its process died"))
                     continue
                 idle.append(worker)
-                result = future.result() if error is None else None
+                result = None if error else future.result()
                 yield Done(worker.item, result, as_exception(error) if error else None)
             for future in [] if timeout_s is None else list(busy):
                 if busy[future].since + cast(float, timeout_s) <= time.monotonic():
-                    worker = busy.pop(future)
-                    worker.kill()
+                    (worker := busy.pop(future)).kill()
                     late = OutOfTimeError(f"not over after {timeout_s:g} s")
                     yield Done(worker.item, None, late)
     finally:
