@@ -15,10 +15,11 @@ from ..analysis.words import Metrics, limit_cycles, with_statistic
 from ..campaign.draws import Draws
 from ..campaign.study import Study
 from ..campaign.verdicts.laws import PairedComparison, compare
+from ..flight.batch import fly_in_lanes
 from ..processes.executor import run_all
 from .criteria import CRITERIA, Criterion, is_error
 from .search_space import GainPoint
-from .trials import Score, fly_in_lanes
+from .trials import Score
 
 Array = NDArray[np.float64]
 
@@ -163,7 +164,8 @@ def _fly(
     draws = _draws(text, seed, runs)
     flights = [draws.flight(run, task.law) for run in task.runs]
     return [
-        CRITERIA[criterion].of(log) if share >= 1.0 else {} for log, share in fly_in_lanes(flights)
+        {} if flown.ending.error else CRITERIA[criterion].of(flown.log)
+        for flown in fly_in_lanes(flights)
     ]
 
 

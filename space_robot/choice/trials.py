@@ -9,23 +9,20 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.config.files import merge
-from space_robot_msgs_py.errors import FlightError
 
 from ..analysis.words import Metrics
 from ..api import Scenario
 from ..campaign.draws.nominal import Nominal, Variation
 from ..campaign.draws.paths import Path, Unavailable, value_at
-from ..flight.batch import FlightBatch, batches
+from ..flight.batch import fly_in_lanes
 from ..flight.plan import Flight
-from ..flight.simulate import simulate
 from .criteria import Criterion
 from .search_space import GainPoint
 
@@ -140,8 +137,10 @@ class Trials:
             self._flight(variation, point) for point in points for variation in self._variations
         ]
         trials = [
-            {"flown": share, **(self._criterion.of(log) if share >= 1.0 else {})}
-            for log, share in fly_in_lanes(flights)
+            {"flown": flown.log.ticks / flight.ticks}
+            if flown.ending.error
+            else {"flown": 1.0, **self._criterion.of(flown.log)}
+            for flight, flown in zip(flights, fly_in_lanes(flights), strict=True)
         ]
         count = len(self._variations)
         return [self._score(trials[k : k + count]) for k in range(0, len(trials), count)]
@@ -170,13 +169,11 @@ class Trials:
 
     def _flight(self, variation: Variation, point: GainPoint) -> Flight:
         gains = {name: values.tolist() for name, values in point.gains.items()}
-        parameters = merge(variation.parameters, {"controller": {self.law.name: gains}})
-        flight = self.nominal.flight_with(variation._replace(parameters=parameters))
-        settings = flight.scenario.controller
-        if settings.acceleration_filter_hz == point.corner_hz:
-            return flight
-        controller = settings.model_copy(update={"acceleration_filter_hz": point.corner_hz})
-        return Flight(replace(flight.scenario, controller=controller))
+        parameters = merge(
+            variation.parameters,
+            {"controller": {self.law.name: gains, "acceleration_filter_hz": point.corner_hz}},
+        )
+        return self.nominal.flight_with(variation._replace(parameters=parameters))
 
     def _score(self, trials: Sequence[Metrics]) -> Score:
         flown = float(np.mean([trial["flown"] for trial in trials]))
@@ -194,27 +191,3 @@ class Trials:
             any(value for name, value in mean.items() if name.endswith(".beyond_effort")),
             mean,
         )
-
-
-def fly_in_lanes(flights: Sequence[Flight]) -> list[tuple[FlightLog, float]]:
-    """Fly flights, those in lanes that can share them; return log and share flown of each."""
-    logs: dict[int, tuple[FlightLog, float]] = {}
-    for group in batches(enumerate(flights)):
-        if len(group) == 1:
-            number, flight = group[0]
-            logs[number] = _fly_alone(flight)
-            continue
-        for flown in FlightBatch([flight for _, flight in group]).fly():
-            number, flight = group[flown.flight]
-            share = 1.0 if flown.ending.error is None else flown.log.ticks / flight.ticks
-            logs[number] = flown.log, share
-    return [logs[number] for number in range(len(flights))]
-
-
-def _fly_alone(flight: Flight) -> tuple[FlightLog, float]:
-    try:
-        return simulate(flight), 1.0
-    except FlightError as error:
-        if error.log is None:
-            raise
-        return error.log, error.log.ticks / flight.ticks

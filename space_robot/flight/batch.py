@@ -22,7 +22,7 @@ from .flown_log import ended_early, note_assumed_errors
 from .lane_loop import fly_lanes, measure_lanes
 from .lane_memory import LawInLanes, LogsInLanes, begin_tick, copy_back, copy_command, lane_memory
 from .plan import Flight
-from .simulate import measured_ticks
+from .simulate import measured_ticks, simulate
 
 
 def batch_obstacle(flight: Flight) -> str:
@@ -104,6 +104,33 @@ class FlownInBatch(NamedTuple):
     """Its number in the batch."""
     log: FlightLog
     ending: Ending
+
+
+def fly_in_lanes(flights: Sequence[Flight]) -> list[FlownInBatch]:
+    """Fly checked flights, those in lanes that can share them; return each, in their order."""
+    flown: dict[int, FlownInBatch] = {}
+    for group in batches(enumerate(flights)):
+        for (number, _), one in zip(group, fly_group([f for _, f in group]), strict=True):
+            flown[number] = one._replace(flight=number)
+    return [flown[number] for number in range(len(flights))]
+
+
+def fly_group(flights: Sequence[Flight], is_brief: bool = False) -> list[FlownInBatch]:
+    """Fly a group of `batches`: several in lanes, one alone; ``is_brief``: see `empty_log`.
+
+    Raises:
+        FlightError: one that flew alone has no log.
+    """
+    if len(flights) > 1:
+        return FlightBatch(flights).fly(is_brief=is_brief)
+    (flight,) = flights
+    try:
+        log, ending = simulate(flight), Ending.complete(flight.ticks, flight.period)
+    except FlightError as error:
+        if error.log is None:
+            raise
+        log, ending = error.log, Ending.early(error, flight.period)
+    return [FlownInBatch(0, log, ending)]
 
 
 class FlightBatch:

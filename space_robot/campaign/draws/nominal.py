@@ -47,6 +47,8 @@ INDEPENDENT = frozenset(
     }
 )
 """Parameters of the plant on which nothing else in a scenario depends."""
+LOW_PASS = ("acceleration_filter_hz",)
+"""The same for the controller."""
 ORBIT_PARAMETERS = frozenset({"orbital_elements", "gravity", "sunlight"})
 """Those that a mission assumes to be known, if it depends on the orbit."""
 
@@ -147,7 +149,9 @@ class Nominal:
     def _resolved(self, variation: Variation) -> ResolvedScenario | None:
         # None if this needs files, or if a number is invalid
         nominal, parameters = self.resolved, dict(variation.parameters)
-        plant_changes, gains = parameters.pop("plant", {}), parameters.pop("controller", {})
+        plant_changes = dict(parameters.pop("plant", {}))
+        gains = dict(parameters.pop("controller", {}))
+        low_pass = {name: gains.pop(name) for name in LOW_PASS if name in gains}
         are_gains = all(law in nominal.laws and isinstance(gains[law], dict) for law in gains)
         if parameters or not are_gains or not plant_changes.keys() <= INDEPENDENT:
             return None
@@ -166,6 +170,7 @@ class Nominal:
         try:
             plant = _plant(nominal.plant, {**plant_changes, "fault_seed": variation.seed})
             laws = _laws(nominal, gains)
+            type(nominal.controller).model_validate(low_pass)
         except ValueError:
             return None
         robots = nominal.robots
@@ -173,6 +178,7 @@ class Nominal:
             nominal,
             options=options,
             plant=plant,
+            controller=nominal.controller.model_copy(update=low_pass),
             gains=merge(nominal.gains, gains),
             robots=robots.with_plant(variation.plant_robot) if variation.plant_robot else robots,
             laws=laws,

@@ -9,13 +9,12 @@ from functools import lru_cache
 
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.config.text import one_line_of
-from space_robot_msgs_py.errors import FlightError, InputError, SpaceRobotError
+from space_robot_msgs_py.errors import InputError, SpaceRobotError
 
 from ...analysis.own_metric import MetricError, listed_metrics
-from ...flight.batch import FlightBatch, batches
+from ...flight.batch import batches, fly_group
 from ...flight.ending import FAILED, Ending
 from ...flight.plan import Flight
-from ...flight.simulate import simulate
 from ..draws import Draws
 from ..study import Study
 from .measure import measure_row, needs_truth_only
@@ -54,7 +53,9 @@ class RowFlyer:
         vary: dict[str, Value] = {}
         try:
             vary = self.draws.values(task.run)
-            return self.flown_row(task, self.draws.flight(task.run, task.law))
+            flight = self.draws.flight(task.run, task.law)
+            (flown,) = fly_group([flight])
+            return self.measured_row(task, flight, flown.ending, flown.log)
         except Exception as error:  # a defect of this package must not end a campaign either
             return _unflown(task, vary, error)
 
@@ -72,33 +73,20 @@ class RowFlyer:
                 flown.append(task)
             except Exception as error:
                 rows.append(_unflown(task, self.draws.values(task.run), error))
+        study = self.study
+        is_brief = not study.metrics and needs_truth_only(flights, study.require.values())
         for group in batches(enumerate(flights)):
             numbers = [number for number, _ in group]
             if len(group) > 1:
                 with suppress(Exception):  # of one of them, whose own row says it
-                    sharing = [flights[k] for k in numbers]
-                    rows += self._rows_in_lanes([flown[k] for k in numbers], sharing)
+                    sharing = [flight for _, flight in group]
+                    rows += [
+                        self.measured_row(flown[numbers[k]], sharing[k], ending, log)
+                        for k, log, ending in fly_group(sharing, is_brief)
+                    ]
                     continue
             rows += [self(flown[k]) for k in numbers]
         return rows
-
-    def _rows_in_lanes(self, tasks: Sequence[Task], flights: Sequence[Flight]) -> list[Row]:
-        study = self.study
-        is_brief = not study.metrics and needs_truth_only(flights, study.require.values())
-        return [
-            self.measured_row(tasks[flown.flight], flights[flown.flight], flown.ending, flown.log)
-            for flown in FlightBatch(flights).fly(is_brief=is_brief)
-        ]
-
-    def flown_row(self, task: Task, flight: Flight) -> Row:
-        """Fly a flight and return its row."""
-        try:
-            log, ending = simulate(flight), Ending.complete(flight.ticks, flight.period)
-        except FlightError as error:
-            if error.log is None:
-                raise
-            log, ending = error.log, Ending.early(error, flight.period)
-        return self.measured_row(task, flight, ending, log)
 
     def measured_row(self, task: Task, flight: Flight, ending: Ending, log: FlightLog) -> Row:
         """Return the row of a flown flight, whose plant is in the state at the end.
