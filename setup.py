@@ -66,7 +66,6 @@ setup(
     python_requires=">=3.10,<3.14",
     install_requires=[
         "click>=8.1",
-        "cma>=4.0",
         "jinja2>=3.1",
         "matplotlib>=3.8",
         "mcap>=1.5",
@@ -77,6 +76,7 @@ setup(
         "pyyaml>=6",
         "rich>=13",
         "rosbags>=0.11",
+        "scikit-learn>=1.3",  # surrogates of `choose`
         "scipy>=1.11.4",
         "setproctitle>=1.2.2",
         "typing_extensions>=4.8",

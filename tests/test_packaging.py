@@ -25,6 +25,7 @@ from space_robot_msgs_py import topics
 ROOT = Path(__file__).resolve().parents[1]
 EXECUTABLES = sorted((ROOT / "resource/executables").iterdir())
 PYPI = {"yaml": "pyyaml", "typing_extensions": "typing-extensions", "pinocchio": "pin"}
+PYPI |= {"sklearn": "scikit-learn"}
 """Names on PyPI of modules that are not called as their package."""
 OF_EXTRAS = {
     "distributed": "dask",
@@ -36,7 +37,7 @@ OF_EXTRAS = {
     "xacro": "xacro",
 }
 """Packages that one command needs, and their extra."""
-ROSDEP = {"pyyaml": "yaml", "rosbags": "rosbags-pip"}
+ROSDEP = {"pyyaml": "yaml", "rosbags": "rosbags-pip", "scikit-learn": "sklearn"}
 """Names of rosdep's keys, behind python3-, where they are not the package's."""
 
 

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from fnmatch import fnmatchcase
 from operator import itemgetter
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from space_robot_msgs_py.bag.flight_log import FlightLog
 
@@ -21,8 +21,8 @@ class Criterion(NamedTuple):
     text: str
     """As in "least ..."."""
     value: Callable[[Metrics], float]
-    error: Callable[[Metrics], float]
-    """What the fronts show, which the value may differ from."""
+    errors: tuple[str, ...] = ("attitude_angle.rms", "joints_*.rms")
+    """Patterns of the errors that the fronts show, which the value may differ from."""
     metrics: tuple[str, ...] = ()
     """Metrics that it needs beside `METRICS`."""
     near: float = math.inf
@@ -30,15 +30,29 @@ class Criterion(NamedTuple):
 
     def of(self, log: FlightLog) -> dict[str, float]:
         """Return the metrics of a complete flight that scores, reasons and this one need."""
-        flight, patterns = AnalysedLog(log), (*METRICS, *self.metrics)
+        flight, patterns = AnalysedLog(log), (*METRICS, *self.errors, *self.metrics)
         known = [n for n in names(flight) if any(fnmatchcase(n, p) for p in patterns)]
         return evaluate(flight, known)[0]
 
+    def log_errors(self, metrics: Metrics) -> dict[str, float]:
+        """Return the logarithm of each error that counts."""
+        return {
+            name: math.log(max(value, 1e-300))
+            for name, value in metrics.items()
+            if any(fnmatchcase(name, pattern) for pattern in self.errors)
+        }
 
-def mean_error(metrics: Metrics) -> float:
-    """Return the geometric mean of the RMS errors of attitude and of each group of joints."""
-    errors = [value for name, value in metrics.items() if is_error(name)]
-    return math.exp(sum(math.log(max(error, 1e-300)) for error in errors) / len(errors))
+    def error(self, metrics: Metrics) -> float:
+        """Return the geometric mean of the errors, see `mean_log`."""
+        return math.exp(mean_log(self.log_errors(metrics)))
+
+
+def mean_log(logs: Mapping[str, Any]) -> Any:
+    """Return the mean of logarithms: attitude, and all groups of joints together, count alike."""
+    joints = [value for name, value in logs.items() if name.startswith("joints_")]
+    others = [value for name, value in logs.items() if not name.startswith("joints_")]
+    kinds = [*others, sum(joints) / len(joints)] if joints else others
+    return sum(kinds) / len(kinds)
 
 
 def is_error(name: str) -> bool:
@@ -46,19 +60,20 @@ def is_error(name: str) -> bool:
     return name.endswith(".rms") and name.startswith(("attitude_angle.", "joints_"))
 
 
-_attitude, _tool = itemgetter("attitude_angle.rms"), itemgetter("tool_position.rms")
+def _tracking(metrics: Metrics) -> float:
+    return CRITERIA["tracking"].error(metrics)
+
+
+_attitude, _tool = "attitude_angle.rms", "tool_position.rms"
 CRITERIA = {
-    "tracking": Criterion(
-        "geometric mean of the RMS errors of attitude and joints", mean_error, mean_error
-    ),
-    "pointing": Criterion("RMS error of the attitude", _attitude, _attitude),
-    "tool": Criterion("RMS error of the tool's position", _tool, _tool, ("tool_position.rms",)),
+    "tracking": Criterion("geometric mean of the RMS errors of attitude and joints", _tracking),
+    "pointing": Criterion("RMS error of the attitude", itemgetter(_attitude), (_attitude,)),
+    "tool": Criterion("RMS error of the tool's position", itemgetter(_tool), (_tool,)),
     "wheels": Criterion(
         "motion of the base's torque up and down, which wears wheels, among laws with at most "
         "three times the least tracking error",
         itemgetter("base_torque.variation"),
-        mean_error,
-        ("base_torque.variation",),
+        metrics=("base_torque.variation",),
         near=3.0,
     ),
 }

@@ -1,13 +1,13 @@
 """The front of a law: its least error for each ripple, over all its gains.
 
-CMA-ES (Hansen, The CMA evolution strategy: a tutorial, arXiv:1604.00772; package `cma`) first
-minimises the error with the ripple that the user allows,
-
-    log(error) + 2 max(0, log(ripple / allowed)),
-
-then, for the rest of the front, ``(1 - w) log(error) + w log(ripple)`` for some weights w, each
-from the best point known. Every gain set that was tried is kept: the front is those which no other
-beats in error and ripple both.
+After a first design (the tuned gains, and gain sets around them and over the whole space) the
+search goes on in batches. Each proposal has the least error with a ripple of at most a share of the
+one that the user allows (`SHARES_OF_RIPPLE`), by what the `surrogate` predicts, each of its
+processes a random number of standard deviations off its mean (as in Berk et al., Randomised
+Gaussian process upper confidence bound for Bayesian optimisation, arXiv:2006.04296). Candidates are
+in a region around the best gain set known for that ripple, which shrinks as the search goes on, and
+such as have some coordinates of it and some of another gain set, since base and joints are nearly
+independent. Every gain set that was tried is kept: the front is those which no other beats in both.
 """
 
 from __future__ import annotations
@@ -15,35 +15,31 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .search_space import SearchSpace
+from .surrogate import ALLOWED_SATURATION, Surrogates
 from .trials import Score, Trials
 
 Array = NDArray[np.float64]
 
-RIPPLE_WEIGHTS = (0.5, 0.8)
-"""Weights of the ripple, from fast laws to smooth ones."""
-FIRST_PART = 0.5
-"""Share of the gain sets for the least error with the ripple allowed."""
-EXCESS_WEIGHT = 2.0
-"""Weight of the logarithm of the ripple beyond what is allowed."""
-POPULATION = 8
-"""Gain sets of a generation: two batches of lanes, with two trials each."""
-FIRST_DESIGN = 16
-"""Gain sets spread over the whole space, and the tuned one, before the search."""
-FIRST_STEP, NEXT_STEP = 0.15, 0.08
-"""Standard deviation of the first generation of the first weight and of the others; 1: the whole
-range of a coordinate."""
-FAILED = 100.0
-"""Objective of a gain set that did not fly to the end, less its share of the flight."""
-SATURATION_WEIGHT = 20.0
-"""Weight of the share of ticks with a wheel at its limit, beyond `ALLOWED_SATURATION`."""
-ALLOWED_SATURATION = 0.01
+SHARES_OF_RIPPLE = (1.0, 0.3, 1.0, 0.1, 1.0, 3.0, 1.0, 1.0)
+"""Ripples of a batch's gain sets, as shares of the one allowed."""
+BATCH = 8
+"""Gain sets of a batch: two batches of lanes, with two trials each."""
+FIRST_DESIGN = 0.2
+"""Share of the gain sets that is not proposed by the surrogates."""
+NEAR = 0.2
+"""Standard deviation of the first design around the tuned gains; a third of it is over all."""
+LONGEST, SHORTEST = 0.4, 0.05
+"""Half the side of the first and of the last region; 1: the whole range of a coordinate."""
+LAST_PART = 0.6
+"""Share of the batches after which only the ripple allowed counts."""
+CANDIDATES, ROUNDS = 400, 4
+"""Points from which a proposal is chosen, and rounds, each in half the region of the last."""
 
 
 class Tried(NamedTuple):
@@ -80,6 +76,12 @@ class Front:
         allowed = [tried for tried in self.best if tried.score.ripple <= ripple]
         return allowed[-1] if allowed else None
 
+    def nearest(self, ripple: float) -> Tried:
+        """Return the gain set of least error with at most a ripple, else that of least ripple."""
+        if (tried := self.within(ripple)) or self.best:
+            return tried or self.best[0]
+        return min(self.tried, key=lambda tried: (-tried.score.flown, tried.score.ripple))
+
     def why_none(self) -> str:
         """Say why no gain set has as little ripple as allowed."""
         count, scores = len(self.tried), [tried.score for tried in self.tried]
@@ -104,34 +106,14 @@ def is_acceptable(score: Score) -> bool:
     return score.is_flyable and score.saturation <= ALLOWED_SATURATION
 
 
-def least_error(score: Score, allowed: float) -> float:
-    """Return what is minimised for the least error with a ripple, see the module."""
-    return _or_failed(
-        score, lambda error, ripple: error + EXCESS_WEIGHT * max(0.0, ripple - math.log(allowed))
-    )
-
-
-def weighted(score: Score, weight: float) -> float:
-    """Return what is minimised for a weight of the ripple, see the module."""
-    return _or_failed(score, lambda error, ripple: (1.0 - weight) * error + weight * ripple)
-
-
-def _or_failed(score: Score, value: Callable[[float, float], float]) -> float:
-    """Return a value of the logarithms of error and ripple; more if limits are exceeded."""
-    if score.flown < 1.0:
-        return FAILED - score.flown
-    number = value(math.log(score.error), math.log(max(score.ripple, 1e-12)))
-    number += SATURATION_WEIGHT * max(0.0, score.saturation - ALLOWED_SATURATION)
-    return number + (FAILED / 2.0 if score.beyond else 0.0)
-
-
 def search_front(
     trials: Trials,
     space: SearchSpace,
     allowed: float,
     evaluations: int,
     seed: int,
-    weights: Sequence[float] = RIPPLE_WEIGHTS,
+    shares: Sequence[float] = SHARES_OF_RIPPLE,
+    progress: Callable[[int], object] = lambda count: None,
 ) -> Front:
     """Search the front of a law.
 
@@ -141,42 +123,68 @@ def search_front(
         allowed: ripple, as a share of the largest torque.
         evaluations: gain sets to try, in all.
         seed: of the search.
-        weights: of the ripple, see the module.
+        shares: of that ripple with which the least error is searched, in turn.
+        progress: called with the number of gain sets after each batch.
     """
-    import cma  # slow to import
-    from scipy.stats import qmc
+    front, random = Front(trials.law.name, []), np.random.default_rng(seed)
 
-    front = Front(trials.law.name, [])
-
-    def fly(points: Sequence[Array]) -> list[Score]:
+    def fly(points: Sequence[Array]) -> None:
         scores = trials.fly([space.at(point) for point in points])
         front.tried.extend(map(Tried, points, scores))
-        return scores
+        progress(len(scores))
 
-    spread = qmc.Sobol(space.dimension, seed=np.random.default_rng(seed)).random(FIRST_DESIGN)
-    fly([space.origin, *spread[1:]][:evaluations])
-    goals: list[Callable[[Score], float]] = [partial(least_error, allowed=allowed)]
-    goals += [partial(weighted, weight=weight) for weight in weights]
-    for number, goal in enumerate(goals):
-        begin = min(front.tried, key=lambda tried: goal(tried.score))
-        strategy = cma.CMAEvolutionStrategy(
-            np.clip(begin.point, 0.02, 0.98),
-            NEXT_STEP if number else FIRST_STEP,
-            {
-                "bounds": [0.0, 1.0],
-                "popsize": POPULATION,
-                "randn": partial(_normal, np.random.default_rng([seed, number])),
-                "seed": np.nan,
-                "verbose": -9,
-            },
-        )
-        rest = (1.0 - FIRST_PART) / len(weights) if weights else 0.0
-        until = evaluations * (FIRST_PART + number * rest if weights else 1.0)
-        while len(front.tried) < until and not strategy.stop():
-            points = strategy.ask()
-            strategy.tell(points, [goal(score) for score in fly(points)])
+    count = min(evaluations, max(BATCH, round(FIRST_DESIGN * evaluations / BATCH) * BATCH))
+    fly(first_design(space, count, random))
+    surrogates = Surrogates(space, allowed)
+    while (left := evaluations - len(front.tried)) > 0:
+        part = (len(front.tried) - count) / (evaluations - count)
+        length = LONGEST * (SHORTEST / LONGEST) ** part
+        points = np.array([tried.point for tried in front.tried])
+        if not surrogates.fit(points, [tried.score for tried in front.tried]):
+            fly(list(random.random((min(left, BATCH), space.dimension))))
+            continue
+        proposed = []
+        for number in range(min(left, BATCH)):
+            share = 1.0 if part > LAST_PART else shares[number % len(shares)]
+            known = np.vstack([front.nearest(share * allowed).point, points])
+            proposed.append(propose(surrogates, known, math.log(share), length, random))
+        fly(proposed)
     return front
 
 
-def _normal(random: np.random.Generator, *shape: int) -> Array:
-    return random.standard_normal(shape)
+def first_design(space: SearchSpace, count: int, random: np.random.Generator) -> list[Array]:
+    """Return the tuned gains, and points around them and over the whole space."""
+    from scipy.stats import norm, qmc
+
+    power = math.ceil(math.log2(count)) if count > 1 else 0
+    spread = qmc.Sobol(space.dimension, seed=random).random_base2(power)[:count]
+    near = np.clip(space.origin + NEAR * norm.ppf(np.clip(spread, 0.01, 0.99)), 0.0, 1.0)
+    return [space.origin, *np.where(np.arange(count)[1:, None] % 3, near[1:], spread[1:])]
+
+
+def propose(
+    surrogates: Surrogates, known: Array, level: float, length: float, random: np.random.Generator
+) -> Array:
+    """Return a point (d,) of the least error with at most a ripple, see the module.
+
+    Args:
+        surrogates: fitted.
+        known: (N, d) points tried, the first one is the middle of the region.
+        level: log(ripple / allowed).
+        length: half the side of the region.
+        random: of candidates and deviations.
+    """
+    names = surrogates.names
+    best: Array = known[0]
+    deviations = dict(zip(names, random.standard_normal(len(names)), strict=True))
+    shape = CANDIDATES, len(best)
+    others = known[random.integers(len(known), size=CANDIDATES)]
+    points = np.where(random.random(shape) < 0.5, others, best)
+    for half in length * 0.5 ** np.arange(ROUNDS):
+        near = best + half * random.uniform(-1.0, 1.0, shape)
+        points = np.clip(np.vstack([best, near, points]), 0.0, 1.0)
+        error, ripple = surrogates.predict(points, deviations)
+        allowed = np.flatnonzero(ripple <= level)
+        best = points[allowed[np.argmin(error[allowed])] if len(allowed) else np.argmin(ripple)]
+        points = points[:0]
+    return best

@@ -28,14 +28,14 @@ from ..console.files import atomic_folder
 from ..tuning.gain_file import estimate_remark
 from ..tuning.task import force_demand
 from .gain_files import make_default
-from .recommend import TUNED_SET, ChoiceOptions, Recommendation, ShowSteps, recommend
+from .recommend import TUNED_SET, ChoiceOptions, Recommendation, recommend
 from .report import campaign_text
 from .robot_files import CAMPAIGN_FILE, ROBOT_FILE
 
 TRIAL: Mapping[str, Any] = {"case": "1", "sensors": "fine", "navigation": "filtered"}
 """Friction and hardware with which the laws are compared."""
 CONDITIONS = "friction, sensors fine and navigation filtered"
-SHORT = ChoiceOptions(evaluations=48, longest_s=8.0, runs=6, weights=())
+SHORT = ChoiceOptions(evaluations=48, longest_s=8.0, runs=6, is_short=True)
 """How the law is chosen: shorter than `space-robot choose` does."""
 
 Array = NDArray[np.float64]
@@ -162,7 +162,6 @@ def make_robot(
     robot: Robot,
     folder: Path,
     command: str,
-    progress: ShowSteps,
     options: ChoiceOptions = SHORT,
 ) -> NewRobot:
     """Create the folder of a robot, and choose the law that it flies.
@@ -173,7 +172,6 @@ def make_robot(
         folder: to be created or replaced, see `check_replaceable`; nothing is left of it after an
             error.
         command: the user's command, for the files' headers.
-        progress: of the steps.
         options: of the choice.
 
     Raises:
@@ -185,7 +183,7 @@ def make_robot(
         mission = rest_to_rest(robot)
         (place / OWN_MISSION).write_text(mission_text(robot, mission, command), "utf-8")
         gains = place / OWN_GAINS
-        choice, tuned = recommend({"robot": str(place), **TRIAL}, gains, options, command, progress)
+        choice, tuned = recommend({"robot": str(place), **TRIAL}, gains, options, command)
         if choice.law:
             choice.install(gains, gains)
             own = replace(choice, scenario={**choice.scenario, "robot": f"{folder}/"})
@@ -282,7 +280,7 @@ def hinge_remark(robot: Robot, command: str, folder: Path) -> str:
 
     Args:
         robot: whose joints are looked at.
-        command: the user's command, without the folder.
+        command: the user's command.
         folder: that it made.
     """
     names = hinges(robot)
@@ -290,7 +288,11 @@ def hinge_remark(robot: Robot, command: str, folder: Path) -> str:
         return ""
     texts = [f"{name}:{own['stiffness']:g},{own['damping']:g}" for name, own in names.items()]
     options = [word for text in texts for word in ("--passive", text)]
-    words = shlex.join([*options, "--out", str(folder), "--force"])
+    typed = shlex.split(command)
+    if not any(word == "--out" or word.startswith("--out=") for word in typed):
+        options += ["--out", str(folder)]
+    options += [] if "--force" in typed else ["--force"]
+    words = shlex.join(options)
     each = "each carries" if len(names) > 1 else "it carries"
     return (
         f"{', '.join(names)}: {each} one body on the base. If that is a panel on a hinge "

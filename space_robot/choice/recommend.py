@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from contextlib import AbstractContextManager
+import os
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -22,22 +22,21 @@ from ..api import Scenario
 from ..campaign.gain_set import tuned_set, write_set
 from ..campaign.study import Law, Study
 from ..campaign.verdicts.laws import PairedComparison
+from ..console.progress import counting_progress, watching_progress
 from ..flight.flown_log import empty_log
 from ..flight.plan import Flight, resolve
 from ..processes.executor import run_all
+from ..processes.scratch_folder import ScratchFolder
 from ..tuning.method import Tuned
 from ..tuning.task import AUTO, TuningOptions, force_demand
 from .candidates import Candidate, FlownCandidate, comparisons, fly_candidates, ranked
 from .criteria import CRITERIA
-from .front import RIPPLE_WEIGHTS, Front, search_front
+from .front import SHARES_OF_RIPPLE, Front, search_front
 from .gain_files import install, write_gains
 from .search_space import GainPoint, SearchSpace
 from .trials import Trials, Uncertainty
 
 Array = NDArray[np.float64]
-ShowSteps = Callable[[str], AbstractContextManager[Callable[[int], Callable[[], None]]]]
-"""Shows a step by its description, see `console.progress.counting_progress`."""
-
 INITIAL_TUNING = TuningOptions(margin=0.05, mass_uncertainty=0.2, h_bar=AUTO)
 """Requirements on the gains from which the search starts."""
 
@@ -61,8 +60,8 @@ class ChoiceOptions:
     """That take part, also ``file.py:Class``; empty: all of this project."""
     evaluations: int = 160
     """Gain sets tried for each law."""
-    weights: tuple[float, ...] = RIPPLE_WEIGHTS
-    """Of the ripple in the search, see `front`."""
+    is_short: bool = False
+    """Whether few numbers of each law are searched, at the ripple allowed only."""
     longest_s: float = 12.0
     """Longest trial; of a longer mission the beginning is flown, s."""
     runs: int = 24
@@ -147,11 +146,7 @@ class Recommendation:
 
 
 def recommend(
-    scenario: Mapping[str, Any],
-    folder: Path,
-    options: ChoiceOptions,
-    command: str,
-    progress: ShowSteps,
+    scenario: Mapping[str, Any], folder: Path, options: ChoiceOptions, command: str
 ) -> tuple[Recommendation, Tuned]:
     """Search the front of each law, fly a candidate of each with many draws, and rank them.
 
@@ -160,7 +155,6 @@ def recommend(
         folder: that exists, for the gains of the candidates.
         options: of the choice.
         command: the user's command, for the files' headers.
-        progress: of the steps.
 
     Returns:
         The choice, and the gains from which the search began.
@@ -169,8 +163,8 @@ def recommend(
         InputError: the scenario cannot be flown, or it has no such law.
     """
     names = tuple(dict.fromkeys(options.laws)) or tuple(sorted(laws()))
-    of_tuning = {key: scenario[key] for key in TUNED if key in scenario}
-    tuned = _tuned(of_tuning, str(scenario.get("case", WITHOUT_PAYLOAD)))
+    for_tuning = {key: scenario[key] for key in TUNED if key in scenario}
+    tuned = _tuned(for_tuning, str(scenario.get("case", WITHOUT_PAYLOAD)))
     write_set(tuned, command, folder / TUNED_SET)
     points, gains = tuned_points(tuned), f"{folder}/{TUNED_SET}"
     for law in names:
@@ -178,20 +172,19 @@ def recommend(
         if "=" not in law and kind.name not in points:
             raise InputError(f"law {law}: has no tuned gains: give some, {law}=GAINS")
     search = _Search(dict(scenario), gains, points, options)
-    nominal = Scenario(**search.options_of(names[0])).check()
+    nominal = Scenario(**search.scenario_with(names[0])).check()
     known = nominal.scenario.robots.controller
     friction = coefficients(known, nominal.plant_settings.friction)[: known.n]
     if (duration := nominal.ticks * nominal.period) < SHORTEST_S:
         raise InputError(f"a choice needs {SHORTEST_S:g} s of flight or more, got {duration:g} s")
     search = replace(
         search,
-        torques=torques_of(nominal),
+        torques=largest_torques(nominal),
         friction=friction,
         duration=min(duration, options.longest_s),
         controls_base=nominal.controls_base,
     )
-    with progress("fronts of the laws") as begin:
-        searched = run_all(search, names, min(options.workers, len(names)), begin)
+    searched = _searched(search, names)
     fronts = {front.law: front for front in searched}
     out: dict[str, str] = {}
     candidates = []
@@ -204,8 +197,8 @@ def recommend(
         point = search.space(law).at(tried.point)
         where = write_gains(controller, point, folder, command, tried.score)
         candidates.append(Candidate(front.law, controller, point, tried.score, f"{where}/"))
-    study = study_of(scenario, nominal, options.uncertainty)
-    with progress("flights of the candidates") as begin:
+    study = candidates_study(scenario, nominal, options.uncertainty)
+    with counting_progress("flights of the candidates") as begin:
         flown = fly_candidates(
             study, candidates, options.criterion, options.runs, options.seed, options.workers, begin
         )
@@ -217,6 +210,19 @@ def recommend(
         dict(scenario), options, fronts, flown, order, compared, out, study.vary
     )
     return found_law, tuned
+
+
+def _searched(search: _Search, names: Sequence[str]) -> list[Front]:
+    """Return the front of each law; a progress line counts their gain sets."""
+    options = search.options
+    with ScratchFolder() as folder:
+        tally = Path(folder) / "tried"
+        tally.touch()
+        with watching_progress(
+            "gain sets tried", options.evaluations * len(names), lambda: tally.stat().st_size
+        ):
+            workers = min(options.workers, len(names))
+            return run_all(replace(search, tally=str(tally)), names, workers)
 
 
 def _tuned(options: Mapping[str, Any], case: str) -> Tuned:
@@ -235,7 +241,7 @@ def has_estimate(law: str) -> bool:
     return "h_bar" in kind.gain_descriptions() or kind.estimates_with_model
 
 
-def torques_of(flight: Flight) -> dict[str, float]:
+def largest_torques(flight: Flight) -> dict[str, float]:
     """Return the largest torque that a mission asks of each group of axes, N m or N."""
     scenario = flight.scenario
     demand = force_demand(scenario.robots.controller, scenario.mission, [scenario.plant])
@@ -243,7 +249,9 @@ def torques_of(flight: Flight) -> dict[str, float]:
     return {name: float(np.mean(demand.peak[axes])) for name, axes in columns.items()}
 
 
-def study_of(scenario: Mapping[str, Any], nominal: Flight, uncertainty: Uncertainty) -> Study:
+def candidates_study(
+    scenario: Mapping[str, Any], nominal: Flight, uncertainty: Uncertainty
+) -> Study:
     """Return the campaign of the candidates, without laws of its own."""
     own = any(not np.isnan(joint.coulomb) for joint in nominal.robot.friction)
     return Study(
@@ -270,22 +278,34 @@ class _Search:
     duration: float = 0.0
     """Of a trial, s."""
     controls_base: bool = True
+    tally: str = os.devnull
+    """File that gets a byte for each gain set tried."""
 
     def __call__(self, law: str) -> Front:
         """Return the front of a law."""
         options = self.options
         trials = Trials(
-            Scenario(**{**self.options_of(law), "duration": self.duration}),
+            Scenario(**{**self.scenario_with(law), "duration": self.duration}),
             options.uncertainty,
             self.torques,
             CRITERIA[options.criterion],
         )
-        space = self.space(law)
+
+        def note(count: int) -> None:
+            with Path(self.tally).open("ab") as file:
+                file.write(bytes(count))
+
         return search_front(
-            trials, space, options.ripple, options.evaluations, options.seed, options.weights
+            trials,
+            self.space(law),
+            options.ripple,
+            options.evaluations,
+            options.seed,
+            (1.0,) if options.is_short else SHARES_OF_RIPPLE,
+            note,
         )
 
-    def options_of(self, law: str) -> dict[str, Any]:
+    def scenario_with(self, law: str) -> dict[str, Any]:
         """Return the options of the scenario with a law."""
         controller, gains = Law.parse(law)
         own = gains if "=" in law else self.gains
@@ -296,10 +316,15 @@ class _Search:
         controller = Law.parse(law).controller
         start = self.points.get(controller)
         if "=" in law:
-            scenario = resolve(Scenario(**self.options_of(law)))
+            scenario = resolve(Scenario(**self.scenario_with(law)))
             corner = scenario.controller.acceleration_filter_hz
             start = GainPoint(scenario.law.gain_values, corner)
         assert start is not None
         return SearchSpace(
-            find_law(controller), start, self.friction, self.controls_base, has_estimate(controller)
+            find_law(controller),
+            start,
+            self.friction,
+            self.controls_base,
+            has_estimate(controller),
+            self.options.is_short,
         )

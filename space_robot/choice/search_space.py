@@ -20,6 +20,8 @@ from space_robot_control.laws import ControlLaw
 Array = NDArray[np.float64]
 
 BASE_AXES = 3
+BASE, JOINTS = "base ", "joints "
+"""Beginnings of the labels of coordinates on their axes."""
 
 
 class Factor(NamedTuple):
@@ -32,11 +34,18 @@ class Factor(NamedTuple):
     highest: float
     is_common: bool = False
     """One factor for all axes; else the base has one, and the joints have another."""
+    is_low_pass: bool = False
+    """Whether the gain is a low-pass's bandwidth in rad/s: its range is the frequencies'."""
 
 
 def bandwidth(**powers: float) -> Factor:
     """Return the factor on a bandwidth W, of which gains are powers."""
     return Factor("bandwidth", powers, 0.05, 50.0)
+
+
+def observer(gain: str) -> Factor:
+    """Return the factor on an observer's bandwidth."""
+    return Factor("observer", {gain: 1.0}, 0.0, 0.0, is_low_pass=True)
 
 
 DAMPING = Factor("damping", {"k_d": 1.0}, 0.4, 2.5, is_common=True)
@@ -50,8 +59,10 @@ DEAD_BAND_RATE = 1e-4
 """On which the factor of the dead band counts, rad/s or m/s."""
 FILTER = "low-pass of the estimate"
 """The one factor on a number of the set instead of a law's: its corner frequency."""
-SLOWEST_HZ, FASTEST_HZ = 2.0, 900.0
-"""Corner frequencies of that low-pass between which is searched."""
+SLOWEST_HZ, FASTEST_HZ = 1.0, 900.0
+"""Corner frequencies of low-passes between which is searched."""
+FIRST_HZ = 30.0
+"""Where the search begins if the set has none, or a faster one."""
 AGAINST_FRICTION = (INTEGRAL, FRICTION, DEAD_BAND)
 KNOWN: Mapping[str, Sequence[Factor]] = {
     "pd": [bandwidth(k_p=2, k_d=1), DAMPING, *AGAINST_FRICTION],
@@ -72,12 +83,12 @@ KNOWN: Mapping[str, Sequence[Factor]] = {
     "indi": [bandwidth(k_p=2, k_d=1), DAMPING],
     "dob": [
         Factor("inertia", {"inertia": 1.0}, 0.05, 20.0),
-        Factor("observer", {"bandwidth": 1.0}, 0.02, 20.0),
+        observer("bandwidth"),
         bandwidth(k_p=2, k_d=1),
     ],
     "adrc": [
         Factor("inertia", {"inertia": 1.0}, 0.05, 20.0),
-        Factor("observer", {"omega_o": 1.0}, 0.05, 20.0),
+        observer("omega_o"),
         bandwidth(omega_c=1),
     ],
     "tde_smc": [H_BAR, bandwidth(lambda_=1), Factor("switching", {"g": 1.0}, 1e-3, 30.0)],
@@ -93,6 +104,10 @@ KNOWN: Mapping[str, Sequence[Factor]] = {
     ],
 }
 """Factors of the project's laws."""
+FROZEN = ("damping", "dead band", "boundary layer", "switching", "reaching", "adaptation")
+"""Factors that a short search leaves as they begin."""
+ALIKE = ("inertia", "inertia of the estimate", "observer")
+"""Those that it has in common for all axes."""
 OWN_RANGE = 30.0
 """Factor by which each gain of a user's law is searched up and down, where it declares none."""
 
@@ -105,6 +120,7 @@ class Coordinate(NamedTuple):
     axes: slice
     lowest: float
     highest: float
+    is_low_pass: bool
 
 
 @dataclass(frozen=True)
@@ -127,6 +143,7 @@ class SearchSpace:
         friction: Array,
         controls_base: bool,
         has_low_pass: bool,
+        is_short: bool = False,
     ) -> None:
         """Lay out the coordinates.
 
@@ -137,16 +154,17 @@ class SearchSpace:
             friction: f_C and f_V (n, 2) of the joints as they are known, N m and N m s/rad.
             controls_base: whether the base has actuators; else its gains are not searched.
             has_low_pass: whether the law has an estimate behind the low-pass of the set.
+            is_short: whether to search few numbers only, see `FROZEN` and `ALIKE`.
         """
-        axes = len(next(iter(start.gains.values())))
-        zeros = {name: np.zeros(axes) for name in law.gain_descriptions()}
+        count = len(next(iter(start.gains.values())))
+        zeros = {name: np.zeros(count) for name in law.gain_descriptions()}
         self.start = start = GainPoint({**zeros, **start.gains}, start.corner_hz)
-        self._known = {name: np.zeros(axes) for name in ("coulomb", "viscous", "dead_band")}
+        self._known = {name: np.zeros(count) for name in ("coulomb", "viscous", "dead_band")}
         self._known["coulomb"][BASE_AXES:], self._known["viscous"][BASE_AXES:] = friction.T
         self._known["dead_band"][BASE_AXES:] = DEAD_BAND_RATE
         factors = KNOWN.get(law.name) or _of_each_gain(law, start.gains)
-        parts = {"base ": slice(0, BASE_AXES)} if controls_base else {}
-        parts |= {"joints ": slice(BASE_AXES, None)}
+        parts = {BASE: slice(0, BASE_AXES)} if controls_base else {}
+        parts |= {JOINTS: slice(BASE_AXES, None)}
         self.coordinates: list[Coordinate] = []
         for factor in factors:
             powers = {name.rstrip("_"): power for name, power in factor.powers.items()}
@@ -154,16 +172,25 @@ class SearchSpace:
                 continue  # h_bar of the nominal model, or no friction
             if factor is DEAD_BAND and not friction[:, 0].any():
                 continue
-            of_parts = {"": slice(None)} if factor.is_common else parts
-            self.coordinates += [
-                Coordinate(part + factor.name, powers, axes, factor.lowest, factor.highest)
-                for part, axes in of_parts.items()
-            ]
+            if is_short and factor.name in FROZEN:
+                for name in powers:
+                    start.gains[name][:] = self._reference(name, start.gains)
+                continue
+            is_common = factor.is_common or (is_short and factor.name in ALIKE)
+            of_parts = {"": slice(None)} if is_common else parts
+            for part, axes in of_parts.items():
+                low, high = factor.lowest, factor.highest
+                if factor.is_low_pass:
+                    fastest = float(max(np.max(start.gains[name][axes]) for name in powers))
+                    low, high = (2.0 * np.pi * hz / fastest for hz in (SLOWEST_HZ, FASTEST_HZ))
+                label = part + factor.name
+                self.coordinates.append(
+                    Coordinate(label, powers, axes, low, high, factor.is_low_pass)
+                )
         if has_low_pass:
             corner = start.corner_hz or FASTEST_HZ
-            self.coordinates.append(
-                Coordinate(FILTER, {}, slice(None), SLOWEST_HZ / corner, FASTEST_HZ / corner)
-            )
+            low, high = SLOWEST_HZ / corner, FASTEST_HZ / corner
+            self.coordinates.append(Coordinate(FILTER, {}, slice(None), low, high, True))
         self._low, self._high = (
             np.log([getattr(c, end) for c in self.coordinates]) for end in ("lowest", "highest")
         )
@@ -177,7 +204,10 @@ class SearchSpace:
     def origin(self) -> Array:
         """The point (d,) of the start, with the known friction fed forward."""
         origin: Array = -self._low / (self._high - self._low)
+        slow = np.log(FIRST_HZ / SLOWEST_HZ) / np.log(FASTEST_HZ / SLOWEST_HZ)
         for k, coordinate in enumerate(self.coordinates):
+            if coordinate.is_low_pass:
+                origin[k] = min(origin[k], slow)
             if "k_i" in coordinate.powers and not self.start.gains["k_i"].any():
                 origin[k] = 0.5  # in the middle of its range
         return np.clip(origin, 0.0, 1.0)
@@ -187,7 +217,7 @@ class SearchSpace:
         gains = {name: values.copy() for name, values in self.start.gains.items()}
         corner = self.start.corner_hz
         factors = np.exp(self._low + np.clip(point, 0.0, 1.0) * (self._high - self._low))
-        for (label, powers, axes, _, _), factor in zip(self.coordinates, factors, strict=True):
+        for (label, powers, axes, *_), factor in zip(self.coordinates, factors, strict=True):
             if label == FILTER:
                 corner = float((self.start.corner_hz or FASTEST_HZ) * factor)
             for name, power in powers.items():

@@ -23,7 +23,7 @@ from ..campaign.draws.nominal import Nominal, Variation
 from ..campaign.draws.paths import Path, Unavailable, value_at
 from ..flight.batch import fly_in_lanes
 from ..flight.plan import Flight
-from .criteria import Criterion
+from .criteria import Criterion, mean_log
 from .search_space import GainPoint
 
 Array = NDArray[np.float64]
@@ -98,6 +98,10 @@ class Score(NamedTuple):
     """True if a joint was beyond its effort limit."""
     metrics: Mapping[str, float]
     """RMS over the trials, by name."""
+    errors: Mapping[str, float] = {}
+    """Logarithms of the errors that count."""
+    ripples: Mapping[str, float] = {}
+    """Logarithms of the ripples as shares."""
 
     @property
     def is_flyable(self) -> bool:
@@ -183,11 +187,18 @@ class Trials:
             name: math.sqrt(float(np.mean([trial.get(name, 0.0) ** 2 for trial in trials])))
             for name in trials[0]
         }
+        errors = self._criterion.log_errors(mean)
+        ripples = {
+            name: math.log(max(mean[f"{name}.ripple"] / most, 1e-12))
+            for name, most in self._torques.items()
+        }
         return Score(
-            self._criterion.error(mean),
-            max(mean[f"{name}.ripple"] / most for name, most in self._torques.items()),
+            math.exp(mean_log(errors)),
+            math.exp(max(ripples.values())),
             mean.get("wheels.saturation", 0.0),
             1.0,
             any(value for name, value in mean.items() if name.endswith(".beyond_effort")),
             mean,
+            errors,
+            ripples,
         )

@@ -115,7 +115,7 @@ def choose(
 
     from ..choice import ChoiceOptions, Uncertainty, recommend
     from ..choice.report import CAMPAIGN, candidates_table, report, write_report
-    from ..console.progress import counting_progress
+    from ..console.files import new_folder
     from ..console.terminal import echo_json, print_table, terminal
     from ..flight.compilation import compile_lanes
     from ..processes.executor import cores
@@ -140,7 +140,8 @@ def choose(
     )
     command = shlex.join(["space-robot", "choose", *context.meta[WORDS]])
     compile_lanes()
-    choice, _ = recommend(scenario, folder, wanted, command, counting_progress)
+    with new_folder(folder):
+        choice, _ = recommend(scenario, folder, wanted, command)
     page = write_report(choice, folder, command)
     chosen = (
         choice.install(folder, files.gains)

@@ -14,6 +14,7 @@ from click.shell_completion import CompletionItem
 
 from . import new_files
 from .choose import search_options
+from .gains import WORDS, TypedCommand
 from .option_types import NumberList, names_in
 from .options import BASE, REPAIR, flight_options
 
@@ -111,7 +112,7 @@ def new() -> None:
     """
 
 
-@new.command("robot", short_help="Make a folder for a robot, and fly it.")
+@new.command("robot", cls=TypedCommand, short_help="Make a folder for a robot, and fly it.")
 @click.argument("robot", shell_complete=names_in("robots"))
 @click.option(
     "--out",
@@ -162,7 +163,10 @@ def new() -> None:
 @click.option("--force", is_flag=True, help="Replace an older folder of this command.")
 @search_options(evaluations=48, runs=6)
 @flight_options("json")
+@click.pass_context
 def new_robot(
+    context: click.Context,
+    /,
     robot: str,
     out: Path | None,
     base: str | None,
@@ -204,7 +208,6 @@ def new_robot(
     from ..choice.new_robot import SHORT, check_replaceable, make_robot
     from ..choice.report import candidates_table
     from ..choice.robot_files import CAMPAIGN_FILE, robot_texts
-    from ..console.progress import counting_progress
     from ..console.terminal import echo_json, print_table, terminal
     from ..flight.compilation import compile_lanes
     from ..processes.executor import cores
@@ -214,15 +217,7 @@ def new_robot(
     chosen = split_choice(robot)
     robot, base, repair = chosen.name, base or chosen.base, repair or chosen.repair
     files = robot_files(robot_as_path(robot))
-    words = ["space-robot", "new", robot, *(["--base", base] if base else [])]
-    words += ["--repair"] if repair else []
-    for joint, spring in passive.items():
-        words += ["--passive", f"{joint}:{spring['stiffness']:.12g},{spring['damping']:.12g}"]
-    words += ["--on", str(on)] if on else []
-    words += ["--base-mass", f"{base_mass:.12g}"] if base_mass is not None else []
-    for option, values in (("base-inertia", base_inertia), ("at", at), ("rpy-deg", rpy_deg)):
-        words += [f"--{option}", ",".join(f"{v:.12g}" for v in values)] if values else []
-    command = shlex.join(words)
+    command = shlex.join(["space-robot", "new", *context.meta[WORDS]])
     mount = _mount(on, base_mass, base_inertia, at, rpy_deg)
     texts, read = robot_texts(files.file, base, repair, command, passive, mount)
     for line in read.repairs:
@@ -237,7 +232,7 @@ def new_robot(
         runs=runs,
         workers=cores() if workers is None else workers,
     )
-    made = make_robot(texts, read, folder, command, counting_progress, options)
+    made = make_robot(texts, read, folder, command, options)
     said = f"made {folder}/: `space-robot fly --robot {folder}/` flies it"
     if made.choice.law:
         said += f", `space-robot campaign run {folder}/{CAMPAIGN_FILE}` the best laws in more draws"

@@ -174,7 +174,7 @@ def test_a_mistake_in_the_code_is_a_row(monkeypatch: pytest.MonkeyPatch) -> None
         raise ZeroDivisionError("division\nby zero")
 
     flying = flyer()
-    monkeypatch.setattr(fly, "simulate", fail)
+    monkeypatch.setattr(fly, "fly_group", fail)
     row = flying(TASK)
     assert (row.outcome, row.reason) == ("failed", "ZeroDivisionError: division by zero")
     assert row.vary

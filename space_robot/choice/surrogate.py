@@ -1,0 +1,133 @@
+"""Surrogates of what trials show: a Gaussian process for each error and each ripple.
+
+Errors of attitude and of each group of joints, and the ripples of their torques, depend on few of
+the gains each, and smoothly, unlike their mean and their largest, of which the search is. Kernel:
+Matern 5/2 with a length scale for each coordinate, of the largest marginal likelihood
+(`sklearn.gaussian_process`), and white noise, since limit cycles make flights rough.
+"""
+
+from __future__ import annotations
+
+import math
+import warnings
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .criteria import mean_log
+from .search_space import BASE, JOINTS, SearchSpace
+from .trials import Score
+
+if TYPE_CHECKING:
+    from sklearn.gaussian_process import GaussianProcessRegressor
+
+Array = NDArray[np.float64]
+
+LENGTHS, NOISE = (0.05, 20.0), (1e-6, 0.1)
+"""Bounds of the length scales (of the unit cube) and of the variance of the noise (of the
+values')."""
+NEAR, FAR = 0.4, 4.0
+"""First length scales."""
+OF_THE_BASE = ("attitude", "base_torque")
+"""Beginnings of the names of errors and torques that are the base's."""
+ALLOWED_SATURATION = 0.01
+"""Largest share of ticks with a wheel at its limit."""
+SATURATION_WEIGHT, BEYOND, FAILED = 20.0, 3.0, 1.0
+"""What is added to logarithms: of each ripple by the share of saturation beyond that, and by a
+joint beyond its effort; of all values by a flight that ended early, on the largest."""
+
+
+class Process(NamedTuple):
+    """A Gaussian process of values with a mean and a scale."""
+
+    process: GaussianProcessRegressor
+    mean: float
+    scale: float
+
+
+class Surrogates:
+    """Processes of the logarithms of all errors and ripples, refitted as trials come in."""
+
+    def __init__(self, space: SearchSpace, allowed: float) -> None:
+        """Begin without values.
+
+        Args:
+            space: that is searched.
+            allowed: ripple, relative to which ripples are.
+        """
+        self._space, self._allowed = space, math.log(allowed)
+        self._processes: dict[str, Process] = {}
+        self._errors: tuple[str, ...] = ()
+
+    def fit(self, points: Array, scores: Sequence[Score]) -> bool:
+        """Fit the processes to scores at points (N, d); return False if none flew to its end."""
+        flown = next((score for score in scores if score.flown >= 1.0), None)
+        if flown is None:
+            return False
+        self._errors = tuple(flown.errors)
+        for name in (*flown.errors, *flown.ripples):
+            values = self._compressed(name, scores)
+            mean, scale = float(np.mean(values)), float(np.std(values)) or 1.0
+            last = self._processes.get(name)
+            process = last.process if last else self._new_process(name)
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore")  # a length scale at its bound: no influence
+                process.fit(points, (values - mean) / scale)
+            process.kernel = process.kernel_  # from which the next fit begins
+            self._processes[name] = Process(process, mean, scale)
+        return True
+
+    def predict(self, points: Array, deviations: Mapping[str, float]) -> tuple[Array, Array]:
+        """Return logarithms (N,) of error, and of ripple / allowed.
+
+        Args:
+            points: (N, d).
+            deviations: of each process from its mean, in standard deviations.
+        """
+        values = {}
+        for name, (process, mean, scale) in self._processes.items():
+            own, deviation = process.predict(points, return_std=True)
+            values[name] = mean + scale * (own + deviations[name] * deviation)
+        error = mean_log({name: values.pop(name) for name in self._errors})
+        return error, np.max(list(values.values()), axis=0)
+
+    @property
+    def names(self) -> list[str]:
+        """The processes' names."""
+        return list(self._processes)
+
+    def _compressed(self, name: str, scores: Sequence[Score]) -> Array:
+        """Return values (N,), with what is far above the useful ones brought nearer."""
+        is_error = name in self._errors
+        values = np.array([_value(score, name, is_error) for score in scores])
+        values -= 0.0 if is_error else self._allowed
+        knee = np.nanmedian(values) if is_error else max(np.nanmedian(values), 0.5)
+        values = np.where(np.isnan(values), np.nanmax(values) + FAILED, values)
+        compressed: Array = np.minimum(values, knee) + np.log1p(np.maximum(values - knee, 0.0))
+        return compressed
+
+    def _new_process(self, name: str) -> GaussianProcessRegressor:
+        from sklearn.gaussian_process import GaussianProcessRegressor  # slow to import
+        from sklearn.gaussian_process.kernels import ConstantKernel, Matern, WhiteKernel
+
+        # gains of the base hardly move the joints, and those of the joints the base
+        others = JOINTS if name.startswith(OF_THE_BASE) else BASE
+        lengths = [
+            FAR if coordinate.label.startswith(others) else NEAR
+            for coordinate in self._space.coordinates
+        ]
+        return GaussianProcessRegressor(
+            ConstantKernel(1.0, (0.05, 50.0)) * Matern(lengths, LENGTHS, nu=2.5)
+            + WhiteKernel(1e-3, NOISE)
+        )
+
+
+def _value(score: Score, name: str, is_error: bool) -> float:
+    if score.flown < 1.0:
+        return math.nan
+    if is_error:
+        return score.errors[name]
+    excess = max(0.0, score.saturation - ALLOWED_SATURATION)
+    return score.ripples[name] + BEYOND * score.beyond + SATURATION_WEIGHT * excess
