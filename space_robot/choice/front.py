@@ -32,7 +32,7 @@ BATCH = 8
 """Gain sets of a batch: two batches of lanes, with two trials each."""
 FIRST_DESIGN = 0.2
 """Share of the gain sets that is not proposed by the surrogates."""
-NEAR = 0.2
+FIRST_SPREAD = 0.2
 """Standard deviation of the first design around the tuned gains; a third of it is over all."""
 LONGEST, SHORTEST = 0.4, 0.05
 """Half the side of the first and of the last region; 1: the whole range of a coordinate."""
@@ -158,7 +158,7 @@ def first_design(space: SearchSpace, count: int, random: np.random.Generator) ->
 
     power = math.ceil(math.log2(count)) if count > 1 else 0
     spread = qmc.Sobol(space.dimension, seed=random).random_base2(power)[:count]
-    near = np.clip(space.origin + NEAR * norm.ppf(np.clip(spread, 0.01, 0.99)), 0.0, 1.0)
+    near = np.clip(space.origin + FIRST_SPREAD * norm.ppf(np.clip(spread, 0.01, 0.99)), 0.0, 1.0)
     return [space.origin, *np.where(np.arange(count)[1:, None] % 3, near[1:], spread[1:])]
 
 

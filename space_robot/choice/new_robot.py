@@ -35,7 +35,7 @@ from .robot_files import CAMPAIGN_FILE, ROBOT_FILE
 TRIAL: Mapping[str, Any] = {"case": "1", "sensors": "fine", "navigation": "filtered"}
 """Friction and hardware with which the laws are compared."""
 CONDITIONS = "friction, sensors fine and navigation filtered"
-SHORT = ChoiceOptions(evaluations=48, longest_s=8.0, runs=6, is_short=True)
+SHORT = ChoiceOptions(evaluations=48, trial_s=6.0, runs=6, is_short=True)
 """How the law is chosen: shorter than `space-robot choose` does."""
 
 Array = NDArray[np.float64]

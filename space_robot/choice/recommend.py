@@ -27,6 +27,7 @@ from ..flight.flown_log import empty_log
 from ..flight.plan import Flight, resolve
 from ..processes.executor import run_all
 from ..processes.scratch_folder import ScratchFolder
+from ..tuning.inertia import SAMPLING, sampled_reference
 from ..tuning.method import Tuned
 from ..tuning.task import AUTO, TuningOptions, force_demand
 from .candidates import Candidate, FlownCandidate, comparisons, fly_candidates, ranked
@@ -42,6 +43,8 @@ INITIAL_TUNING = TuningOptions(margin=0.05, mass_uncertainty=0.2, h_bar=AUTO)
 
 WITHOUT_PAYLOAD = "1"
 """The case with friction alone."""
+FAST, LONGEST_TRIAL_S = 0.6, 40.0
+"""Share of the largest speed that is fast; the longest trial, s."""
 TUNED_SET = "tuned"
 """Name of the set from which the search starts."""
 TUNED = ("robot", "mission", "sensors", "navigation", "orbit", "period", "parameters")
@@ -62,8 +65,9 @@ class ChoiceOptions:
     """Gain sets tried for each law."""
     is_short: bool = False
     """Whether few numbers of each law are searched, at the ripple allowed only."""
-    longest_s: float = 12.0
-    """Longest trial; of a longer mission the beginning is flown, s."""
+    trial_s: float = 12.0
+    """Duration of a trial, s: of a longer mission the beginning is flown, and of a slow one as
+    much as it takes until it is fast, see `fast_at`."""
     runs: int = 24
     """Draws that every candidate flies."""
     seed: int = 1
@@ -181,7 +185,7 @@ def recommend(
         search,
         torques=largest_torques(nominal),
         friction=friction,
-        duration=min(duration, options.longest_s),
+        duration=min(duration, max(options.trial_s, fast_at(nominal))),
         controls_base=nominal.controls_base,
     )
     searched = _searched(search, names)
@@ -247,6 +251,16 @@ def largest_torques(flight: Flight) -> dict[str, float]:
     demand = force_demand(scenario.robots.controller, scenario.mission, [scenario.plant])
     columns = AnalysedLog(empty_log(flight, 0, 1, is_brief=True)).torque_columns
     return {name: float(np.mean(demand.peak[axes])) for name, axes in columns.items()}
+
+
+def fast_at(flight: Flight) -> float:
+    """Return when the joints, or the base, are first about as fast as ever in a mission, s."""
+    scenario = flight.scenario
+    motion = sampled_reference(scenario.robots.controller, scenario.mission)
+    joints, base = motion.joints[:, 1], motion.base[:, 4:7]
+    speed = np.linalg.norm(joints if joints.any() else base, axis=1)
+    first = int(np.argmax(speed >= FAST * speed.max(initial=0.0)))
+    return min(first * SAMPLING, LONGEST_TRIAL_S)
 
 
 def candidates_study(

@@ -28,8 +28,8 @@ Array = NDArray[np.float64]
 LENGTHS, NOISE = (0.05, 20.0), (1e-6, 0.1)
 """Bounds of the length scales (of the unit cube) and of the variance of the noise (of the
 values')."""
-NEAR, FAR = 0.4, 4.0
-"""First length scales."""
+OWN_LENGTH, OTHER_LENGTH = 0.4, 4.0
+"""First length scales, of gains of the same axes or all, and of the other axes."""
 OF_THE_BASE = ("attitude", "base_torque")
 """Beginnings of the names of errors and torques that are the base's."""
 ALLOWED_SATURATION = 0.01
@@ -115,7 +115,7 @@ class Surrogates:
         # gains of the base hardly move the joints, and those of the joints the base
         others = JOINTS if name.startswith(OF_THE_BASE) else BASE
         lengths = [
-            FAR if coordinate.label.startswith(others) else NEAR
+            OTHER_LENGTH if coordinate.label.startswith(others) else OWN_LENGTH
             for coordinate in self._space.coordinates
         ]
         return GaussianProcessRegressor(
