@@ -6,12 +6,14 @@
 | `trials` | flights of a gain set with a light and a heavy robot, and its score |
 | `front` | the search for the least error at each ripple |
 | `candidates` | one gain set a law, flown with many draws; who is out, and the ranks |
+| `law_search` | the search of one law or several for a scenario |
 | `recommend` | all of it for a scenario |
 | `gain_files`, `report` | its gains, campaign, tables, JSON and page |
 | `new_robot`, `robot_files` | the folder of a new robot, with the law chosen for it |
 """
 
-from .recommend import ChoiceOptions, Recommendation, recommend
+from .law_search import ChoiceOptions, tune_law
+from .recommend import Recommendation, recommend
 from .trials import Uncertainty
 
-__all__ = ["ChoiceOptions", "Recommendation", "Uncertainty", "recommend"]
+__all__ = ["ChoiceOptions", "Recommendation", "Uncertainty", "recommend", "tune_law"]

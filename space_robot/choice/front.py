@@ -2,12 +2,13 @@
 
 After a first design (the tuned gains, and gain sets around them and over the whole space) the
 search goes on in batches. Each proposal has the least error with a ripple of at most a share of the
-one that the user allows (`SHARES_OF_RIPPLE`), by what the `surrogate` predicts, each of its
-processes a random number of standard deviations off its mean (as in Berk et al., Randomised
-Gaussian process upper confidence bound for Bayesian optimisation, arXiv:2006.04296). Candidates are
-in a region around the best gain set known for that ripple, which shrinks as the search goes on, and
-such as have some coordinates of it and some of another gain set, since base and joints are nearly
-independent. Every gain set that was tried is kept: the front is those which no other beats in both.
+one that the user allows (`SHARES_OF_RIPPLE`), or the least ripple with an error, by what the
+`surrogate` predicts, each of its processes a random number of standard deviations off its mean (as
+in Berk et al., Randomised Gaussian process upper confidence bound for Bayesian optimisation,
+arXiv:2006.04296). Candidates are in a region around the best gain set known for that ripple, which
+shrinks as the search goes on, and such as have some coordinates of it and some of another gain set,
+since base and joints are nearly independent. Every gain set that was tried is kept: the front is
+those which no other beats in both.
 """
 
 from __future__ import annotations
@@ -40,6 +41,15 @@ LAST_PART = 0.6
 """Share of the batches after which only the ripple allowed counts."""
 CANDIDATES, ROUNDS = 400, 4
 """Points from which a proposal is chosen, and rounds, each in half the region of the last."""
+
+
+class Goal(NamedTuple):
+    """The place on a front that a search is for."""
+
+    ripple: float
+    """Least error with at most this ripple, a share of the largest torque."""
+    error: float | None = None
+    """If set: least ripple with at most this error."""
 
 
 class Tried(NamedTuple):
@@ -76,18 +86,28 @@ class Front:
         allowed = [tried for tried in self.best if tried.score.ripple <= ripple]
         return allowed[-1] if allowed else None
 
-    def nearest(self, ripple: float) -> Tried:
-        """Return the gain set of least error with at most a ripple, else that of least ripple."""
-        if (tried := self.within(ripple)) or self.best:
-            return tried or self.best[0]
+    def nearest(self, goal: Goal) -> Tried:
+        """Return the gain set of a goal, else the one that lacks least for it."""
+        if chosen := self.chosen(goal):
+            return chosen
+        if self.best:
+            return self.best[0 if goal.error is None else -1]
         return min(self.tried, key=lambda tried: (-tried.score.flown, tried.score.ripple))
 
-    def why_none(self) -> str:
-        """Say why no gain set has as little ripple as allowed."""
+    def chosen(self, goal: Goal) -> Tried | None:
+        """Return the gain set of a goal; None: none has so little ripple, or error."""
+        if goal.error is None:
+            return self.within(goal.ripple)
+        return next((tried for tried in self.best if tried.score.error <= goal.error), None)
+
+    def why_none(self, goal: Goal) -> str:
+        """Say why there is no gain set of a goal."""
         count, scores = len(self.tried), [tried.score for tried in self.tried]
         ended = sum(score.flown < 1.0 for score in scores)
         beyond = sum(score.beyond for score in scores)
         full = sum(score.saturation > ALLOWED_SATURATION for score in scores)
+        if self.best and goal.error is not None:
+            return f"error of at least {self.best[-1].score.error:.3g}"
         if self.best:
             return f"ripple of at least {self.best[0].score.ripple:.1%} of the largest torque"
         return (
@@ -109,7 +129,7 @@ def is_acceptable(score: Score) -> bool:
 def search_front(
     trials: Trials,
     space: SearchSpace,
-    allowed: float,
+    goal: Goal,
     evaluations: int,
     seed: int,
     shares: Sequence[float] = SHARES_OF_RIPPLE,
@@ -120,10 +140,10 @@ def search_front(
     Args:
         trials: that are flown with each gain set.
         space: of the gains.
-        allowed: ripple, as a share of the largest torque.
+        goal: for which more gain sets are tried than for the rest of the front.
         evaluations: gain sets to try, in all.
         seed: of the search.
-        shares: of that ripple with which the least error is searched, in turn.
+        shares: of its ripple, or error, with which is searched in turn.
         progress: called with the number of gain sets after each batch.
     """
     front, random = Front(trials.law.name, []), np.random.default_rng(seed)
@@ -135,7 +155,7 @@ def search_front(
 
     count = min(evaluations, max(BATCH, round(FIRST_DESIGN * evaluations / BATCH) * BATCH))
     fly(first_design(space, count, random))
-    surrogates = Surrogates(space, allowed)
+    surrogates = Surrogates(space, goal.ripple)
     while (left := evaluations - len(front.tried)) > 0:
         part = (len(front.tried) - count) / (evaluations - count)
         length = LONGEST * (SHORTEST / LONGEST) ** part
@@ -146,8 +166,11 @@ def search_front(
         proposed = []
         for number in range(min(left, BATCH)):
             share = 1.0 if part > LAST_PART else shares[number % len(shares)]
-            known = np.vstack([front.nearest(share * allowed).point, points])
-            proposed.append(propose(surrogates, known, math.log(share), length, random))
+            own = goal._replace(ripple=share * goal.ripple)
+            if goal.error is not None:
+                own = goal._replace(error=goal.error / share)
+            known = np.vstack([front.nearest(own).point, points])
+            proposed.append(propose(surrogates, known, own, length, random))
         fly(proposed)
     return front
 
@@ -163,14 +186,14 @@ def first_design(space: SearchSpace, count: int, random: np.random.Generator) ->
 
 
 def propose(
-    surrogates: Surrogates, known: Array, level: float, length: float, random: np.random.Generator
+    surrogates: Surrogates, known: Array, goal: Goal, length: float, random: np.random.Generator
 ) -> Array:
-    """Return a point (d,) of the least error with at most a ripple, see the module.
+    """Return a point (d,) for a goal, see the module.
 
     Args:
         surrogates: fitted.
         known: (N, d) points tried, the first one is the middle of the region.
-        level: log(ripple / allowed).
+        goal: on the front.
         length: half the side of the region.
         random: of candidates and deviations.
     """
@@ -184,7 +207,10 @@ def propose(
         near = best + half * random.uniform(-1.0, 1.0, shape)
         points = np.clip(np.vstack([best, near, points]), 0.0, 1.0)
         error, ripple = surrogates.predict(points, deviations)
-        allowed = np.flatnonzero(ripple <= level)
-        best = points[allowed[np.argmin(error[allowed])] if len(allowed) else np.argmin(ripple)]
+        value, bounded, bound = error, ripple, math.log(goal.ripple)
+        if goal.error is not None:
+            value, bounded, bound = ripple, error, math.log(goal.error)
+        allowed = np.flatnonzero(bounded <= bound)
+        best = points[allowed[np.argmin(value[allowed])] if len(allowed) else np.argmin(bounded)]
         points = points[:0]
     return best

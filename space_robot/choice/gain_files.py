@@ -20,12 +20,12 @@ CHOSEN = "chosen"
 def write_gains(
     controller: str, point: GainPoint, folder: Path, command: str, score: Score
 ) -> Path:
-    """Write the gains of a law as a set of its own; return its folder.
+    """Write the gains of a law as a set of its own; return the folder.
 
     Args:
         controller: the law, see `find_law`.
         point: its gains.
-        folder: in which the set's folder is made, with the law's name.
+        folder: of the set.
         command: the user's command, for the header.
         score: of its trials.
 
@@ -33,7 +33,6 @@ def write_gains(
         InputError: the folder cannot be created or written.
     """
     law = find_law(controller).name
-    folder = folder / law
     make_folder(folder)
     comments = [
         f"Made by `{command}`.",

@@ -28,7 +28,8 @@ from ..console.files import atomic_folder
 from ..tuning.gain_file import estimate_remark
 from ..tuning.task import force_demand
 from .gain_files import make_default
-from .recommend import TUNED_SET, ChoiceOptions, Recommendation, recommend
+from .law_search import TUNED_SET, ChoiceOptions
+from .recommend import Recommendation, recommend
 from .report import campaign_text
 from .robot_files import CAMPAIGN_FILE, ROBOT_FILE
 

@@ -2,77 +2,26 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from space_robot_control.controller.settings import OF_THE_SET
-from space_robot_control.laws import find_law, laws
-from space_robot_msgs_py.errors import InputError
-from space_robot_sim.environment.friction import coefficients
 
-from ..analysis.analysed_log import AnalysedLog
-from ..analysis.torques import SHORTEST_S
-from ..api import Scenario
-from ..campaign.gain_set import tuned_set, write_set
 from ..campaign.study import Law, Study
 from ..campaign.verdicts.laws import PairedComparison
-from ..console.progress import counting_progress, watching_progress
-from ..flight.flown_log import empty_log
-from ..flight.plan import Flight, resolve
-from ..processes.executor import run_all
-from ..processes.scratch_folder import ScratchFolder
-from ..tuning.inertia import SAMPLING, sampled_reference
+from ..console.progress import counting_progress
+from ..flight.plan import Flight
 from ..tuning.method import Tuned
-from ..tuning.task import AUTO, TuningOptions, force_demand
 from .candidates import Candidate, FlownCandidate, comparisons, fly_candidates, ranked
 from .criteria import CRITERIA
-from .front import SHARES_OF_RIPPLE, Front, search_front
+from .front import Front
 from .gain_files import install, write_gains
-from .search_space import GainPoint, SearchSpace
-from .trials import Trials, Uncertainty
-
-Array = NDArray[np.float64]
-INITIAL_TUNING = TuningOptions(margin=0.05, mass_uncertainty=0.2, h_bar=AUTO)
-"""Requirements on the gains from which the search starts."""
-
-WITHOUT_PAYLOAD = "1"
-"""The case with friction alone."""
-FAST, LONGEST_TRIAL_S = 0.6, 40.0
-"""Share of the largest speed that is fast; the longest trial, s."""
-TUNED_SET = "tuned"
-"""Name of the set from which the search starts."""
-TUNED = ("robot", "mission", "sensors", "navigation", "orbit", "period", "parameters")
-"""Options of a scenario that gains are tuned for."""
-
-
-@dataclass(frozen=True)
-class ChoiceOptions:
-    """How a law is chosen."""
-
-    criterion: str = "tracking"
-    """Name of one of `CRITERIA`."""
-    ripple: float = 0.05
-    """Largest ripple of the torques, as a share of the largest one in the mission."""
-    laws: tuple[str, ...] = ()
-    """That take part, also ``file.py:Class``; empty: all of this project."""
-    evaluations: int = 160
-    """Gain sets tried for each law."""
-    is_short: bool = False
-    """Whether few numbers of each law are searched, at the ripple allowed only."""
-    trial_s: float = 12.0
-    """Duration of a trial, s: of a longer mission the beginning is flown, and of a slow one as
-    much as it takes until it is fast, see `fast_at`."""
-    runs: int = 24
-    """Draws that every candidate flies."""
-    seed: int = 1
-    workers: int = 1
-    uncertainty: Uncertainty = field(default_factory=Uncertainty)
+from .law_search import TUNED_SET, ChoiceOptions, has_estimate, prepare
+from .trials import Uncertainty
 
 
 @dataclass(frozen=True)
@@ -166,29 +115,8 @@ def recommend(
     Raises:
         InputError: the scenario cannot be flown, or it has no such law.
     """
-    names = tuple(dict.fromkeys(options.laws)) or tuple(sorted(laws()))
-    for_tuning = {key: scenario[key] for key in TUNED if key in scenario}
-    tuned = _tuned(for_tuning, str(scenario.get("case", WITHOUT_PAYLOAD)))
-    write_set(tuned, command, folder / TUNED_SET)
-    points, gains = tuned_points(tuned), f"{folder}/{TUNED_SET}"
-    for law in names:
-        kind = find_law(Law.parse(law).controller)
-        if "=" not in law and kind.name not in points:
-            raise InputError(f"law {law}: has no tuned gains: give some, {law}=GAINS")
-    search = _Search(dict(scenario), gains, points, options)
-    nominal = Scenario(**search.scenario_with(names[0])).check()
-    known = nominal.scenario.robots.controller
-    friction = coefficients(known, nominal.plant_settings.friction)[: known.n]
-    if (duration := nominal.ticks * nominal.period) < SHORTEST_S:
-        raise InputError(f"a choice needs {SHORTEST_S:g} s of flight or more, got {duration:g} s")
-    search = replace(
-        search,
-        torques=largest_torques(nominal),
-        friction=friction,
-        duration=min(duration, max(options.trial_s, fast_at(nominal))),
-        controls_base=nominal.controls_base,
-    )
-    searched = _searched(search, names)
+    search, nominal, tuned = prepare(scenario, folder, options, command)
+    names, searched = search.laws, search.fronts()
     fronts = {front.law: front for front in searched}
     out: dict[str, str] = {}
     candidates = []
@@ -196,10 +124,10 @@ def recommend(
         controller = Law.parse(law).controller
         tried = front.within(options.ripple)
         if tried is None:
-            out[front.law] = front.why_none()
+            out[front.law] = front.why_none(options.goal)
             continue
         point = search.space(law).at(tried.point)
-        where = write_gains(controller, point, folder, command, tried.score)
+        where = write_gains(controller, point, folder / front.law, command, tried.score)
         candidates.append(Candidate(front.law, controller, point, tried.score, f"{where}/"))
     study = candidates_study(scenario, nominal, options.uncertainty)
     with counting_progress("flights of the candidates") as begin:
@@ -216,53 +144,6 @@ def recommend(
     return found_law, tuned
 
 
-def _searched(search: _Search, names: Sequence[str]) -> list[Front]:
-    """Return the front of each law; a progress line counts their gain sets."""
-    options = search.options
-    with ScratchFolder() as folder:
-        tally = Path(folder) / "tried"
-        tally.touch()
-        with watching_progress(
-            "gain sets tried", options.evaluations * len(names), lambda: tally.stat().st_size
-        ):
-            workers = min(options.workers, len(names))
-            return run_all(replace(search, tally=str(tally)), names, workers)
-
-
-def _tuned(options: Mapping[str, Any], case: str) -> Tuned:
-    """Tune for a case; where its payload leaves no margin at all, for the robot without one."""
-    try:
-        return tuned_set(options, [case], INITIAL_TUNING, lambda text: None)
-    except InputError:
-        if case == WITHOUT_PAYLOAD:
-            raise
-        return tuned_set(options, [WITHOUT_PAYLOAD], INITIAL_TUNING, lambda text: None)
-
-
-def has_estimate(law: str) -> bool:
-    """Return True if a law has an estimate behind the low-pass of the set."""
-    kind = find_law(law)
-    return "h_bar" in kind.gain_descriptions() or kind.estimates_with_model
-
-
-def largest_torques(flight: Flight) -> dict[str, float]:
-    """Return the largest torque that a mission asks of each group of axes, N m or N."""
-    scenario = flight.scenario
-    demand = force_demand(scenario.robots.controller, scenario.mission, [scenario.plant])
-    columns = AnalysedLog(empty_log(flight, 0, 1, is_brief=True)).torque_columns
-    return {name: float(np.mean(demand.peak[axes])) for name, axes in columns.items()}
-
-
-def fast_at(flight: Flight) -> float:
-    """Return when the joints, or the base, are first about as fast as ever in a mission, s."""
-    scenario = flight.scenario
-    motion = sampled_reference(scenario.robots.controller, scenario.mission)
-    joints, base = motion.joints[:, 1], motion.base[:, 4:7]
-    speed = np.linalg.norm(joints if joints.any() else base, axis=1)
-    first = int(np.argmax(speed >= FAST * speed.max(initial=0.0)))
-    return min(first * SAMPLING, LONGEST_TRIAL_S)
-
-
 def candidates_study(
     scenario: Mapping[str, Any], nominal: Flight, uncertainty: Uncertainty
 ) -> Study:
@@ -271,74 +152,3 @@ def candidates_study(
     return Study(
         scenario=dict(scenario), laws=[nominal.law.name], vary=uncertainty.vary(own_friction=own)
     )
-
-
-def tuned_points(tuned: Tuned) -> dict[str, GainPoint]:
-    """Return the gains of a tuned set by law."""
-    return {law: GainPoint(own.gains, tuned.corner_hz) for law, own in tuned.laws.items()}
-
-
-@dataclass(frozen=True)
-class _Search:
-    """Searches the front of a law; it can be sent to other processes."""
-
-    scenario: dict[str, Any]
-    gains: str
-    points: dict[str, GainPoint]
-    options: ChoiceOptions
-    torques: dict[str, float] = field(default_factory=dict)
-    friction: Array = field(default_factory=lambda: np.empty((0, 2)))
-    """f_C and f_V (n, 2) of the joints as a user knows them."""
-    duration: float = 0.0
-    """Of a trial, s."""
-    controls_base: bool = True
-    tally: str = os.devnull
-    """File that gets a byte for each gain set tried."""
-
-    def __call__(self, law: str) -> Front:
-        """Return the front of a law."""
-        options = self.options
-        trials = Trials(
-            Scenario(**{**self.scenario_with(law), "duration": self.duration}),
-            options.uncertainty,
-            self.torques,
-            CRITERIA[options.criterion],
-        )
-
-        def note(count: int) -> None:
-            with Path(self.tally).open("ab") as file:
-                file.write(bytes(count))
-
-        return search_front(
-            trials,
-            self.space(law),
-            options.ripple,
-            options.evaluations,
-            options.seed,
-            (1.0,) if options.is_short else SHARES_OF_RIPPLE,
-            note,
-        )
-
-    def scenario_with(self, law: str) -> dict[str, Any]:
-        """Return the options of the scenario with a law."""
-        controller, gains = Law.parse(law)
-        own = gains if "=" in law else self.gains
-        return {**self.scenario, "controller": controller, "gains": own}
-
-    def space(self, law: str) -> SearchSpace:
-        """Return the search space of a law."""
-        controller = Law.parse(law).controller
-        start = self.points.get(controller)
-        if "=" in law:
-            scenario = resolve(Scenario(**self.scenario_with(law)))
-            corner = scenario.controller.acceleration_filter_hz
-            start = GainPoint(scenario.law.gain_values, corner)
-        assert start is not None
-        return SearchSpace(
-            find_law(controller),
-            start,
-            self.friction,
-            self.controls_base,
-            has_estimate(controller),
-            self.options.is_short,
-        )

@@ -24,6 +24,10 @@ BASE, JOINTS = "base ", "joints "
 """Beginnings of the labels of coordinates on their axes."""
 
 
+BANDWIDTH = "bandwidth"
+"""Name of the factor on the poles of a law."""
+
+
 class Factor(NamedTuple):
     """A factor on gains of a law."""
 
@@ -40,7 +44,7 @@ class Factor(NamedTuple):
 
 def bandwidth(**powers: float) -> Factor:
     """Return the factor on a bandwidth W, of which gains are powers."""
-    return Factor("bandwidth", powers, 0.05, 50.0)
+    return Factor(BANDWIDTH, powers, 0.05, 50.0)
 
 
 def observer(gain: str) -> Factor:
@@ -144,6 +148,7 @@ class SearchSpace:
         controls_base: bool,
         has_low_pass: bool,
         is_short: bool = False,
+        faster: float | None = None,
     ) -> None:
         """Lay out the coordinates.
 
@@ -155,10 +160,12 @@ class SearchSpace:
             controls_base: whether the base has actuators; else its gains are not searched.
             has_low_pass: whether the law has an estimate behind the low-pass of the set.
             is_short: whether to search few numbers only, see `FROZEN` and `ALIKE`.
+            faster: factor on the bandwidth of the start, which is then not searched.
         """
         count = len(next(iter(start.gains.values())))
         zeros = {name: np.zeros(count) for name in law.gain_descriptions()}
-        self.start = start = GainPoint({**zeros, **start.gains}, start.corner_hz)
+        own = {name: values.copy() for name, values in start.gains.items()}
+        self.start = start = GainPoint({**zeros, **own}, start.corner_hz)
         self._known = {name: np.zeros(count) for name in ("coulomb", "viscous", "dead_band")}
         self._known["coulomb"][BASE_AXES:], self._known["viscous"][BASE_AXES:] = friction.T
         self._known["dead_band"][BASE_AXES:] = DEAD_BAND_RATE
@@ -175,6 +182,10 @@ class SearchSpace:
             if is_short and factor.name in FROZEN:
                 for name in powers:
                     start.gains[name][:] = self._reference(name, start.gains)
+                continue
+            if faster is not None and factor.name == BANDWIDTH:
+                for name, power in powers.items():
+                    start.gains[name][:] *= faster**power
                 continue
             is_common = factor.is_common or (is_short and factor.name in ALIKE)
             of_parts = {"": slice(None)} if is_common else parts

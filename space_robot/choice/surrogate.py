@@ -80,7 +80,7 @@ class Surrogates:
         return True
 
     def predict(self, points: Array, deviations: Mapping[str, float]) -> tuple[Array, Array]:
-        """Return logarithms (N,) of error, and of ripple / allowed.
+        """Return logarithms (N,) of error and ripple.
 
         Args:
             points: (N, d).
@@ -91,7 +91,7 @@ class Surrogates:
             own, deviation = process.predict(points, return_std=True)
             values[name] = mean + scale * (own + deviations[name] * deviation)
         error = mean_log({name: values.pop(name) for name in self._errors})
-        return error, np.max(list(values.values()), axis=0)
+        return error, np.max(list(values.values()), axis=0) + self._allowed
 
     @property
     def names(self) -> list[str]:

@@ -85,7 +85,9 @@ class TypedCommand(click.Command):
 
 
 @gains.command(cls=TypedCommand)
-@flight_options("robot", "mission", "orbit", "sensors", "navigation", "period", "set")
+@flight_options(
+    *("robot", "mission", "orbit", "sensors", "actuators", "navigation", "period", "set")
+)
 @click.option(
     "--case",
     "cases",
@@ -93,7 +95,40 @@ class TypedCommand(click.Command):
     default=["1"],
     show_default=True,
     metavar="CASE",
-    help="A case that is to be flown, with its payload; may be repeated.",
+    help="A case that is to be flown, with its payload; may be repeated, without --law.",
+)
+@click.option(
+    "--law",
+    metavar="LAW",
+    help="Search the gains of this law by flights, also file.py:Class=GAINS of your own "
+    "[default: all laws, by the method].",
+)
+@click.option(
+    "--ripple",
+    type=FiniteRange(0.0, 10.0, min_open=True),
+    metavar="SHARE",
+    help="Ripple of a torque, RMS, as a share of the largest that the mission asks. With --law: "
+    "least error with at most this [default: 0.05]; else by noise alone [default: 0.1].",
+)
+@click.option(
+    "--error",
+    type=FiniteRange(0.0, 10.0, min_open=True),
+    metavar="ERROR",
+    help="With --law: least ripple with at most this mean of the RMS errors of attitude and "
+    "joints, rad and m.",
+)
+@click.option(
+    "--bandwidth",
+    type=FiniteRange(0.0, 1e4, min_open=True),
+    metavar="W",
+    help="Poles, rad/s [default: with --law searched, else what lag and ripple allow].",
+)
+@click.option(
+    "--evaluations",
+    type=click.IntRange(1, 100_000),
+    default=160,
+    show_default=True,
+    help="With --law: gain sets to try.",
 )
 @click.option(
     "--margin",
@@ -104,32 +139,13 @@ class TypedCommand(click.Command):
 )
 @MASS_UNCERTAINTY
 @click.option(
-    "--bandwidth",
-    type=FiniteRange(0.0, 1e4, min_open=True),
-    metavar="W",
-    help="Poles of all laws, rad/s [default: what lag and ripple allow].",
-)
-@click.option(
-    "--ripple",
-    type=FiniteRange(0.0, 10.0, min_open=True),
-    default=0.1,
-    show_default=True,
-    help="Noise allowed on a torque, RMS, as a share of the largest that the mission asks.",
-)
-@click.option(
     "--h-bar",
     "h_bar",
     type=click.Choice(["constant", "nominal", "auto"]),
     default="constant",
     show_default=True,
-    help="Inertia of the laws with time-delay estimation: a constant diagonal, H_S of the nominal "
-    "model, or that one only where no diagonal will do.",
-)
-@click.option(
-    "--noise-ripple",
-    type=FiniteRange(0.0, 10.0, min_open=True),
-    metavar="SHARE",
-    help="Give every law this ripple by noise, in place of at most --ripple.",
+    help="Without --law, inertia of the laws with time-delay estimation: a constant diagonal, H_S "
+    "of the nominal model, or that one only where no diagonal will do.",
 )
 @click.option(
     "-o",
@@ -140,19 +156,38 @@ class TypedCommand(click.Command):
     help="Folder of the set, for --gains.",
 )
 @click.pass_context
-def tune(context: click.Context, /, output: Path, **options: Any) -> None:
-    """Make a gain set for all laws by a deterministic method.
+def tune(
+    context: click.Context,
+    /,
+    output: Path,
+    law: str | None,
+    cases: tuple[str, ...],
+    ripple: float | None,
+    error: float | None,
+    bandwidth: float | None,
+    evaluations: int,
+    margin: float,
+    mass_uncertainty: float,
+    h_bar: str,
+    **options: Any,
+) -> None:
+    """Make a gain set: for all laws by a method, or for one law by flights.
 
-    h_bar from the inertia along the mission, so that the time-delay estimate contracts with the
-    margin asked for, whichever of the masses are wrong; a low-pass for it; poles below its lag;
-    switching gains from the errors that are left. Sensors and navigation are listened to on a robot
-    at rest; nothing is flown. space_robot/tuning/method.py has the method.
+    The method flies nothing. It takes h_bar from the inertia along the mission, so that the
+    time-delay estimate contracts with the margin asked for, whichever of the masses are wrong; a
+    low-pass for it; poles below its lag; switching gains from the errors that are left. Sensors and
+    navigation are listened to on a robot at rest. space_robot/tuning/method.py has it.
+
+    With --law the front of one law is searched from there on, in flights with a light and a heavy
+    robot, as `space-robot choose` does for all: the least error with a ripple, the least ripple
+    with an error, or the best other gains for poles of your own.
 
     \b
     Examples:
       space-robot gains tune -o my_gains
       space-robot gains tune --sensors fine --navigation filtered -o my_gains
       space-robot gains tune --robot seven_joint --case 1 --case 2 --margin 0.03 -o my_gains
+      space-robot gains tune --law dob --sensors fine --navigation filtered --ripple 0.03 -o my_dob
       space-robot fly --gains my_gains
     """
     from ..campaign.gain_set import tuned_set, write_set
@@ -160,9 +195,31 @@ def tune(context: click.Context, /, output: Path, **options: Any) -> None:
     from ..tuning.gain_file import estimate_remark
     from ..tuning.task import TuningOptions
 
-    names = ("margin", "mass_uncertainty", "bandwidth", "ripple", "h_bar", "noise_ripple")
-    wanted, cases = TuningOptions(*(options.pop(name) for name in names)), options.pop("cases")
     command = shlex.join(["space-robot", "gains", "tune", *context.meta[WORDS]])
+    if law is not None:
+        from ..choice import ChoiceOptions, Uncertainty, tune_law
+        from ..flight.compilation import compile_lanes
+
+        if len(cases) > 1:
+            raise click.UsageError("--law flies one --case")
+        searched = ChoiceOptions(
+            ripple=ripple or 0.05,
+            error=error,
+            bandwidth=bandwidth,
+            laws=(law,),
+            evaluations=evaluations,
+            uncertainty=Uncertainty(mass=mass_uncertainty, torque_scale=margin),
+        )
+        compile_lanes()
+        score = tune_law({**options, "case": cases[0]}, output, searched, command).score
+        click.echo(
+            f"wrote {output}: in trials error {score.error:.3g}, ripple {score.ripple:.2%}",
+            err=True,
+        )
+        return
+    if error is not None:
+        raise click.UsageError("--error needs --law: it is reached by flights")
+    wanted = TuningOptions(margin, mass_uncertainty, bandwidth, ripple or 0.1, h_bar)
     with terminal(stderr=True).status("tuning") as status:
         tuned = tuned_set(options, cases, wanted, status.update)
     for path in write_set(tuned, command, output):

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 from space_robot.choice.criteria import CRITERIA
 from space_robot.choice.front import Front, Tried
-from space_robot.choice.recommend import has_estimate
+from space_robot.choice.law_search import has_estimate
 from space_robot.choice.search_space import FASTEST_HZ, SLOWEST_HZ, GainPoint, SearchSpace
 from space_robot.choice.trials import Score
 from space_robot.cli.main import cli

@@ -63,7 +63,7 @@ def new(*arguments: str) -> Result:
 
 def quickly(monkeypatch: pytest.MonkeyPatch, *of_laws: str) -> None:
     """Let `new` choose among some laws, with the gains from which a search would start."""
-    short = ChoiceOptions(laws=of_laws, evaluations=1, longest_s=1.0, runs=2, ripple=10.0)
+    short = ChoiceOptions(laws=of_laws, evaluations=1, trial_s=1.0, runs=2, ripple=10.0)
     monkeypatch.setattr("space_robot.choice.new_robot.SHORT", short)
 
 

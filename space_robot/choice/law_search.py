@@ -1,0 +1,274 @@
+"""The search of one law or several: what is common to `recommend` and to `gains tune --law`."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from space_robot_control.laws import find_law, laws
+from space_robot_msgs_py.errors import InputError
+from space_robot_sim.environment.friction import coefficients
+
+from ..analysis.analysed_log import AnalysedLog
+from ..analysis.torques import SHORTEST_S
+from ..api import Scenario
+from ..campaign.gain_set import tuned_set, write_set
+from ..campaign.study import Law
+from ..console.progress import watching_progress
+from ..flight.flown_log import empty_log
+from ..flight.plan import Flight, resolve
+from ..processes.executor import run_all
+from ..processes.scratch_folder import ScratchFolder
+from ..tuning.inertia import SAMPLING, sampled_reference
+from ..tuning.method import Tuned
+from ..tuning.task import AUTO, TuningOptions, force_demand
+from .criteria import CRITERIA
+from .front import SHARES_OF_RIPPLE, Front, Goal, Tried, search_front
+from .gain_files import write_gains
+from .search_space import GainPoint, SearchSpace
+from .trials import Trials, Uncertainty
+
+Array = NDArray[np.float64]
+
+INITIAL_TUNING = TuningOptions(margin=0.05, mass_uncertainty=0.2, h_bar=AUTO)
+"""Requirements on the gains from which the search starts."""
+
+WITHOUT_PAYLOAD = "1"
+"""The case with friction alone."""
+FAST, LONGEST_TRIAL_S = 0.6, 40.0
+"""Share of the largest speed that is fast; the longest trial, s."""
+TUNED_SET = "tuned"
+"""Name of the set from which the search starts."""
+TUNED = ("robot", "mission", "sensors", "navigation", "orbit", "period", "parameters")
+"""Options of a scenario that gains are tuned for."""
+
+
+@dataclass(frozen=True)
+class ChoiceOptions:
+    """How a law is chosen."""
+
+    criterion: str = "tracking"
+    """Name of one of `CRITERIA`."""
+    ripple: float = 0.05
+    """Largest ripple of the torques, as a share of the largest one in the mission."""
+    laws: tuple[str, ...] = ()
+    """That take part, also ``file.py:Class``; empty: all of this project."""
+    evaluations: int = 160
+    """Gain sets tried for each law."""
+    is_short: bool = False
+    """Whether few numbers of each law are searched, at the ripple allowed only."""
+    trial_s: float = 12.0
+    """Duration of a trial, s: of a longer mission the beginning is flown, and of a slow one as
+    much as it takes until it is fast, see `fast_at`."""
+    runs: int = 24
+    """Draws that every candidate flies."""
+    seed: int = 1
+    workers: int = 1
+    uncertainty: Uncertainty = field(default_factory=Uncertainty)
+    error: float | None = None
+    """If set: the least ripple with at most this error is searched."""
+    bandwidth: float | None = None
+    """If set: poles of the law, rad/s; only its other gains are searched."""
+
+    @property
+    def goal(self) -> Goal:
+        """The place on the front that is searched."""
+        return Goal(self.ripple, self.error)
+
+
+def prepare(
+    scenario: Mapping[str, Any], folder: Path, options: ChoiceOptions, command: str
+) -> tuple[LawSearch, Flight, Tuned]:
+    """Tune all laws for a scenario, and prepare the search of their gains from there on.
+
+    Args:
+        scenario: options of a `Scenario`, without law and gains.
+        folder: that exists, for the tuned set.
+        options: of the search.
+        command: the user's command, for the files' headers.
+
+    Returns:
+        The search, the nominal flight, and the gains from which the search begins.
+
+    Raises:
+        InputError: the scenario cannot be flown, or it has no such law.
+    """
+    names = tuple(dict.fromkeys(options.laws)) or tuple(sorted(laws()))
+    for_tuning = {key: scenario[key] for key in TUNED if key in scenario}
+    tuned = _tuned(for_tuning, str(scenario.get("case", WITHOUT_PAYLOAD)))
+    write_set(tuned, command, folder / TUNED_SET)
+    points = {law: GainPoint(own.gains, tuned.corner_hz) for law, own in tuned.laws.items()}
+    bandwidths = {law: own.bandwidth for law, own in tuned.laws.items()}
+    gains = f"{folder}/{TUNED_SET}"
+    for law in names:
+        kind = find_law(Law.parse(law).controller)
+        if "=" not in law and kind.name not in points:
+            raise InputError(f"law {law}: has no tuned gains: give some, {law}=GAINS")
+    search = LawSearch(names, dict(scenario), gains, points, options, bandwidths)
+    nominal = Scenario(**search.scenario_with(names[0])).check()
+    known = nominal.scenario.robots.controller
+    friction = coefficients(known, nominal.plant_settings.friction)[: known.n]
+    if (duration := nominal.ticks * nominal.period) < SHORTEST_S:
+        raise InputError(f"a search needs {SHORTEST_S:g} s of flight or more, got {duration:g} s")
+    search = replace(
+        search,
+        torques=largest_torques(nominal),
+        friction=friction,
+        duration=min(duration, max(options.trial_s, fast_at(nominal))),
+        controls_base=nominal.controls_base,
+    )
+    return search, nominal, tuned
+
+
+def _tuned(options: Mapping[str, Any], case: str) -> Tuned:
+    """Tune for a case; where its payload leaves no margin at all, for the robot without one."""
+    try:
+        return tuned_set(options, [case], INITIAL_TUNING, lambda text: None)
+    except InputError:
+        if case == WITHOUT_PAYLOAD:
+            raise
+        return tuned_set(options, [WITHOUT_PAYLOAD], INITIAL_TUNING, lambda text: None)
+
+
+def has_estimate(law: str) -> bool:
+    """Return True if a law has an estimate behind the low-pass of the set."""
+    kind = find_law(law)
+    return "h_bar" in kind.gain_descriptions() or kind.estimates_with_model
+
+
+def largest_torques(flight: Flight) -> dict[str, float]:
+    """Return the largest torque that a mission asks of each group of axes, N m or N."""
+    scenario = flight.scenario
+    demand = force_demand(scenario.robots.controller, scenario.mission, [scenario.plant])
+    columns = AnalysedLog(empty_log(flight, 0, 1, is_brief=True)).torque_columns
+    return {name: float(np.mean(demand.peak[axes])) for name, axes in columns.items()}
+
+
+def fast_at(flight: Flight) -> float:
+    """Return when the joints, or the base, are first about as fast as ever in a mission, s."""
+    scenario = flight.scenario
+    motion = sampled_reference(scenario.robots.controller, scenario.mission)
+    joints, base = motion.joints[:, 1], motion.base[:, 4:7]
+    speed = np.linalg.norm(joints if joints.any() else base, axis=1)
+    first = int(np.argmax(speed >= FAST * speed.max(initial=0.0)))
+    return min(first * SAMPLING, LONGEST_TRIAL_S)
+
+
+@dataclass(frozen=True)
+class LawSearch:
+    """Searches the front of a law; it can be sent to other processes."""
+
+    laws: tuple[str, ...]
+    """Also ``file.py:Class=GAINS``."""
+    scenario: dict[str, Any]
+    gains: str
+    points: dict[str, GainPoint]
+    options: ChoiceOptions
+    bandwidths: dict[str, float]
+    """W of the tuned gains by law, rad/s."""
+    torques: dict[str, float] = field(default_factory=dict)
+    friction: Array = field(default_factory=lambda: np.empty((0, 2)))
+    """f_C and f_V (n, 2) of the joints as a user knows them."""
+    duration: float = 0.0
+    """Of a trial, s."""
+    controls_base: bool = True
+    tally: str = os.devnull
+    """File that gets a byte for each gain set tried."""
+
+    def __call__(self, law: str) -> Front:
+        """Return the front of a law."""
+        options = self.options
+        trials = Trials(
+            Scenario(**{**self.scenario_with(law), "duration": self.duration}),
+            options.uncertainty,
+            self.torques,
+            CRITERIA[options.criterion],
+        )
+
+        def note(count: int) -> None:
+            with Path(self.tally).open("ab") as file:
+                file.write(bytes(count))
+
+        return search_front(
+            trials,
+            self.space(law),
+            options.goal,
+            options.evaluations,
+            options.seed,
+            (1.0,) if options.is_short else SHARES_OF_RIPPLE,
+            note,
+        )
+
+    def fronts(self) -> list[Front]:
+        """Return the front of each law; a progress line counts their gain sets."""
+        with ScratchFolder() as folder:
+            tally = Path(folder) / "tried"
+            tally.touch()
+            total = self.options.evaluations * len(self.laws)
+            with watching_progress("gain sets tried", total, lambda: tally.stat().st_size):
+                workers = min(self.options.workers, len(self.laws))
+                return run_all(replace(self, tally=str(tally)), self.laws, workers)
+
+    def scenario_with(self, law: str) -> dict[str, Any]:
+        """Return the options of the scenario with a law."""
+        controller, gains = Law.parse(law)
+        own = gains if "=" in law else self.gains
+        return {**self.scenario, "controller": controller, "gains": own}
+
+    def space(self, law: str) -> SearchSpace:
+        """Return the search space of a law."""
+        controller = Law.parse(law).controller
+        start = self.points.get(controller)
+        if "=" in law:
+            scenario = resolve(Scenario(**self.scenario_with(law)))
+            corner = scenario.controller.acceleration_filter_hz
+            start = GainPoint(scenario.law.gain_values, corner)
+        assert start is not None
+        return SearchSpace(
+            find_law(controller),
+            start,
+            self.friction,
+            self.controls_base,
+            has_estimate(controller),
+            self.options.is_short,
+            self._slower(controller),
+        )
+
+    def _slower(self, controller: str) -> float | None:
+        """Return the factor on the bandwidth of the start that gives the user's; None: free."""
+        wanted = self.options.bandwidth
+        if wanted is None:
+            return None
+        if controller not in self.bandwidths:
+            raise InputError(f"law {controller}: has no bandwidth that is known")
+        return wanted / self.bandwidths[controller]
+
+
+def tune_law(
+    scenario: Mapping[str, Any], folder: Path, options: ChoiceOptions, command: str
+) -> Tried:
+    """Search the gains of one law for a place on its front, and write them as a set.
+
+    Args:
+        scenario: options of a `Scenario`, without law and gains.
+        folder: of the set.
+        options: with the one law, and ripple, error or bandwidth.
+        command: the user's command, for the files' headers.
+
+    Raises:
+        InputError: the scenario cannot be flown, or no gains are as asked.
+    """
+    with ScratchFolder() as place:
+        search, _, _ = prepare(scenario, Path(place), options, command)
+        (law,), (front,) = search.laws, search.fronts()
+        if (tried := front.chosen(options.goal)) is None:
+            raise InputError(f"law {law}: no gains are as asked: {front.why_none(options.goal)}")
+        point = search.space(law).at(tried.point)
+    write_gains(Law.parse(law).controller, point, folder, command, tried.score)
+    return tried
