@@ -1,20 +1,16 @@
-"""Put tables and figures of the flown campaigns into law_league.md and rivals.md.
+"""Put tables and figures of the flown campaigns into law_league.md.
 
-`python docs/law_league.py` does so; with ``--geared DIR`` it makes the robot with gears of
-rivals.md. The pages name the folders: between ``<!-- begin DIR -->`` and ``<!-- end -->`` are the
-tables in which `space-robot campaign report DIR --markdown` compares laws. The figure goes beside
-the page, named like the folder. ``<!-- begin DIR medians -->`` has one table, a metric a row,
-``<!-- begin DIR ranks -->`` one with medians and ranks. Folders that are not there are left out.
+`python docs/law_league.py` does so. The page names the folders: between ``<!-- begin DIR -->`` and
+``<!-- end -->`` are the tables in which `space-robot campaign report DIR --markdown` compares laws.
+The figure goes beside the page, named like the folder. ``<!-- begin DIR medians -->`` has one
+table, a metric a row, ``<!-- begin DIR ranks -->`` one with medians and ranks. Folders that are not
+there are left out.
 """
 
 from __future__ import annotations
 
 import re
-import shutil
-import sys
 from pathlib import Path
-
-import yaml
 
 from space_robot.analysis.figures.style import save_figure
 from space_robot.campaign.flown import FlownCampaign
@@ -25,9 +21,9 @@ from space_robot.campaign.report.tables import choice_tables, league_tables
 from space_robot.console.tables import Column, Group, Table, as_markdown
 
 HERE = Path(__file__).parent
-PAGES = [HERE / "law_league.md", HERE / "rivals.md"]
+PAGE = HERE / "law_league.md"
 BLOCK = re.compile(
-    r"(<!-- begin (\S+)( medians| by law| ranks)?( with figure)? -->\n).*?(<!-- end -->)", re.DOTALL
+    r"(<!-- begin (\S+)( medians| ranks)?( with figure)? -->\n).*?(<!-- end -->)", re.DOTALL
 )
 COMPARING = {"rank", "to fly"}
 """Columns of tables that compare laws."""
@@ -67,25 +63,6 @@ def medians(findings: Findings) -> str:
     return as_markdown("", [Table("", columns, [Group(rows)])]).lstrip("# \n")
 
 
-def by_law(findings: Findings) -> str:
-    """Return the medians with a law a row, named without the gain sets that they share."""
-    found = choice_tables(findings)
-    names = [own_name(column.name, ", nominal inertia") for column in found[0].columns]
-    cells = [
-        [re.sub(r"failed \(1e\+02\)", "diverge", str(cell)) for cell in table.groups[0].rows[0]]
-        for table in found
-    ]
-    rows = [[name, *own] for name, own in zip(names, zip(*cells, strict=True), strict=True)]
-    rows[-1] = [own_name(str(cell), " nominal") for cell in rows[-1]]
-    columns = [Column("median", is_label=True), *(Column(table.title) for table in found)]
-    return as_markdown("", [Table("", columns, [Group(rows)])]).lstrip("# \n")
-
-
-def own_name(text: str, nominal: str) -> str:
-    """Return names of competitors without the gain sets that they share."""
-    return re.sub(r"=equal_[a-z]+", "", text).replace("_nominal", nominal)
-
-
 def ranks(findings: Findings) -> str:
     """Return medians and ranks as one table, a metric a row; the campaign has no grid."""
     rows: dict[str, dict[str, str]] = {}
@@ -106,26 +83,10 @@ def renewed(found: re.Match[str]) -> str:
     findings = Findings.of(FlownCampaign.open(found[2]))
     runs = f"{findings.table['run'].nunique()} runs, seed {findings.seed}.\n\n"
     picture = figure(findings) if found[4] else ""
-    of_kind = {" medians": medians, " by law": by_law, " ranks": ranks}.get(found[3], block)
+    of_kind = {" medians": medians, " ranks": ranks}.get(found[3], block)
     text = of_kind(findings)
     return f"{found[1]}{runs}{picture}{text}{found[5]}"
 
 
-def geared(folder: Path) -> None:
-    """Make a folder for the paper's robot with gears of 1e5 N m/rad, encoders on the motors."""
-    sys.path.append(str(HERE / "flown"))
-    from flexible_joints import geared as geared_robot
-
-    config = HERE.parent / "config"
-    shutil.copytree(config / "gains" / "paper", folder / "gains")
-    shutil.copy(config / "missions" / "paper.yaml", folder / "mission.yaml")
-    text = yaml.safe_dump(geared_robot(1e5, "motor"))
-    (folder / "robot.yaml").write_text(text, "utf-8")
-
-
 if __name__ == "__main__":
-    if sys.argv[1:2] == ["--geared"]:
-        geared(Path(sys.argv[2]))
-    else:
-        for page in PAGES:
-            page.write_text(BLOCK.sub(renewed, page.read_text("utf-8")), "utf-8")
+    PAGE.write_text(BLOCK.sub(renewed, PAGE.read_text("utf-8")), "utf-8")

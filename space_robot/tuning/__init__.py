@@ -7,6 +7,6 @@
 | `flexible` | the same loop with the springs of gears |
 | `spectrum` | convergence of a time-delay estimate, also with wrong masses |
 | `gain_check`, `warning` | the check of given gains; remarks before a flight |
-| `noise`, `ripple` | noise and lag of the sensors; ripple of the torque by them |
+| `noise` | noise and lag of the sensors |
 | `method` | a new set: `task`, `estimate_design`, `law_gains`; its texts: `gain_file` |
 """

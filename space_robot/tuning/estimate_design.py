@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,7 +11,8 @@ from numpy.typing import NDArray
 
 from space_robot_msgs_py.errors import InputError
 
-from .ripple import quiet_bandwidth, quiet_weight
+from .closed_loop import bisect
+from .noise import Noise
 from .spectrum import eigenvalues
 from .task import CONSTANT, MOST_PER_TICK, NOMINAL, SEPARATION, TuningTask
 
@@ -17,6 +20,10 @@ Array = NDArray[np.float64]
 
 K_1_FACTOR = 2.2
 """K_1 of the super-twisting term by the square root of W eps, see step 6 of `method`."""
+LEAST_WEIGHT = 1e-4
+"""Smallest weight of a low-pass: a corner of 0.03 Hz at 2 kHz."""
+BISECTIONS = 12
+"""Of a weight's logarithm: it is then more precise than the written digits."""
 MUCH_SLOWER = 0.1
 """A law is weak below this share of the bandwidth of the laws with a model."""
 
@@ -60,7 +67,7 @@ def constant_estimate(task: TuningTask) -> EstimateDesign:
     size = options.margin * (1.0 + options.mass_uncertainty) / low
     weight = min(1.0, (1.0 - options.mass_uncertainty) / (size * high))
     h_bar = size * task.shape
-    if task.noise and not options.noise_ripple:
+    if task.noise:
         weight = quiet_weight(weight, task.noise.acceleration, task.allowed / h_bar)
     return _design(task, CONSTANT, h_bar, size * low, size * high, weight)
 
@@ -79,7 +86,7 @@ def nominal_estimate(task: TuningTask, weight: float | None = None) -> EstimateD
     low, high = float(eigen.min()), float(eigen.max())
     if weight is None:
         weight = min(1.0, (1.0 - task.options.mass_uncertainty) / high)
-        if (noise := task.noise) and not task.options.noise_ripple:
+        if noise := task.noise:
             weight = quiet_weight(
                 weight, lambda w: noise.nominal_force(w, task.nominal), task.allowed
             )
@@ -176,7 +183,42 @@ def model_bandwidth(task: TuningTask, own: Array | None = None) -> float:
     if own is None:
         own = np.diagonal(task.inertia, axis1=1, axis2=2).max(axis=0)
         most = task.most_per_tick
-    bandwidth = most / task.period
-    if not task.options.noise_ripple:
-        bandwidth = min(quiet_bandwidth(own, task.noise, task.allowed), bandwidth)
+    bandwidth = min(quiet_bandwidth(own, task.noise, task.allowed), most / task.period)
     return min(bandwidth, 1.0 / SEPARATION / task.lag) if task.lag else bandwidth
+
+
+def quiet_weight(largest: float, noise: Callable[[float], Array], most: Array) -> float:
+    """Return the largest weight of a low-pass, at most ``largest``, with noise up to ``most`` (m,).
+
+    Args:
+        largest: weight.
+        noise: (m,) with a weight, with which it grows.
+        most: in the unit of the noise.
+
+    Raises:
+        InputError: there is no such weight.
+    """
+
+    def is_quiet(logarithm: float) -> bool:
+        return bool(np.all(noise(math.exp(logarithm)) <= most))
+
+    if np.any(noise(LEAST_WEIGHT) > most):
+        raise InputError("no low-pass reduces the noise of these sensors enough: allow more ripple")
+    if np.all(noise(largest) <= most):
+        return largest
+    return math.exp(bisect(math.log(LEAST_WEIGHT), math.log(largest), is_quiet, BISECTIONS))
+
+
+def quiet_bandwidth(own: Array, noise: Noise | None, allowed: Array) -> float:
+    """Return the largest W, rad/s, with noise up to ``allowed`` (m,), N m, of a law without lag.
+
+    ``own^2 (4 W^2 sigma_rate^2 + W^4 sigma_e^2) = allowed^2`` on the limiting axis; ``own`` (m,) is
+    the inertia by which the law multiplies K_P and K_D, kg m2.
+    """
+    if noise is None or not noise.rates.any():
+        return math.inf
+    rate, angle = 2.0 * own * noise.rates.std(axis=0), own * noise.errors.std(axis=0)
+    root = np.sqrt(rate**4 + 4.0 * (angle * allowed) ** 2)
+    with np.errstate(divide="ignore"):
+        squares = 2.0 * allowed**2 / (rate**2 + root)
+    return float(np.sqrt(squares.min()))

@@ -97,7 +97,7 @@ def _numbers(tuned: Tuned, law: TunedLaw) -> Sequence[str]:
         if design.switching < 1.0:
             lines.append(
                 f"eps is {design.switching:.2g} times the bound of the estimate's error: K_1 for "
-                f"the whole would switch the force by more than {options.allowed_ripple:.0%}."
+                f"the whole would switch the force by more than {options.ripple:.0%}."
             )
     return [*lines, *law.remarks]
 

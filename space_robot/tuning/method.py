@@ -56,28 +56,13 @@ by which the super-twisting term switches in discrete time, remains within the a
 the force, ``|H_S| K_1^2 delta / 2``: K_1 of one axis moves all axes here. It is used on
 request, or (``auto``) where the laws with a constant h_bar would have less than a tenth of the
 bandwidth of the laws with a model.
-
-**Equal ripple** (``--noise-ripple``), for fair comparisons: each law has one free parameter, the
-largest with which no axis exceeds the share of its largest force by noise (`ripple`):
-
-- W of the laws without an estimate, and of `indi` in a set with a constant h_bar;
-- the weight of the pair's low-pass of the laws with time-delay estimation, which they share, with
-  that of TDE-TSMC; W follows from it by step 4;
-- the weight of `dob`, W likewise, and omega_o of `adrc`, omega_c likewise.
-
-The laws with time-delay estimation have half of the variance by their linear part. The other half
-is left to their switching terms: K_1, K_2 and g are those of an error ``c eps``, c <= 1, with which
-the law itself, run on the held robot, has the ripple. A law remains below the share where lag or
-period end its range. `indi` in a set with a constant h_bar exceeds it where its estimate does so
-behind the low-pass of the set, whatever W; it then has the W of the method.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -102,22 +87,14 @@ from .law_gains import (
     tune_adrc,
     tune_dob,
     tune_indi,
-    tune_tde_tsmc,
 )
 from .noise import Noise
-from .ripple import LEAST_WEIGHT, largest_quiet, linear_ripple, switching_ripple
-from .task import AUTO, CONSTANT, NOMINAL, ForceDemand, TuningOptions, TuningTask, axis_inertia
+from .task import AUTO, NOMINAL, ForceDemand, TuningOptions, TuningTask, axis_inertia
 
 Array = NDArray[np.float64]
 
 DIGITS = 3
 """Significant digits of a gain: few enough to be equal on all machines."""
-LEAST_BANDWIDTH = 1e-3
-"""Smallest W, rad/s."""
-LEAST_SHARE = 1e-6
-"""Smallest c of the switching terms."""
-LINEAR_SHARE = 0.5
-"""Share of the variance that the linear part of a law with switching terms has."""
 
 
 @dataclass(frozen=True)
@@ -165,36 +142,21 @@ def tune(
     """
     on_all_axes = demand.on_all_axes(axis_inertia(inertia))
     task = TuningTask(inertia, postures, on_all_axes, options, period, noise, has_gears)
-    has_ripple = bool(options.noise_ripple and noise and noise.rates.any())
     constant = first = constant_estimate(task)
-    observer = _estimate_at_ripple(task, first, for_observer=True) if has_ripple else first
-    if has_ripple:
-        constant = _estimate_at_ripple(task, first)
-    elif has_gears:  # the low-pass is also that of `indi`, whose inertia is far above the motors'
+    if has_gears:  # the low-pass is also that of `indi`, whose inertia is far above the motors'
         constant = with_weight(task, first, min(first.weight, nominal_estimate(task).weight))
     design = constant
     if options.h_bar == NOMINAL or (options.h_bar == AUTO and is_weak(constant, task)):
         design = nominal_estimate(task)
-        design = _estimate_at_ripple(task, design) if has_ripple else design
     check_estimate(task, design)
-    tuned = {
-        name: _with_quiet_switching(task, name, design) if has_ripple else rule(task, design)
-        for name, rule in WITH_ESTIMATE.items()
-    }
+    tuned = {name: rule(task, design) for name, rule in WITH_ESTIMATE.items()}
     for name, simple_rule in WITHOUT_ESTIMATE.items():
-        if name not in laws():
-            continue
-        own_rule = partial(simple_rule, task)
-        most = model_bandwidth(task, task.shape if name in WITHOUT_MODEL else None)
-        if has_ripple:
-            most = _bandwidth_at_ripple(task, name, own_rule, most)
-        tuned[name] = own_rule(most)
+        if name in laws():
+            own = task.shape if name in WITHOUT_MODEL else None
+            tuned[name] = simple_rule(task, model_bandwidth(task, own))
     incremental = nominal_estimate(task, design.weight)
-    indi_rule, most = partial(tune_indi, task, incremental), incremental.bandwidth
-    if has_ripple and design.kind == CONSTANT:
-        most = _bandwidth_at_ripple(task, "indi", indi_rule, most, design.weight)
-    tuned["indi"] = indi_rule(most)
-    tuned["dob"] = tune_dob(task, observer)
+    tuned["indi"] = tune_indi(task, incremental, incremental.bandwidth)
+    tuned["dob"] = tune_dob(task, first)
     tuned["adrc"] = tune_adrc(task, replace(constant, weight=first.weight))
     weight = design.weight
     corner = 0.0 if weight >= 1.0 else -math.log(1.0 - weight) / (2.0 * math.pi * period)
@@ -209,46 +171,3 @@ def significant(values: Array | float) -> Array:
     """Round to `DIGITS` significant digits."""
     rounded: Array = np.vectorize(lambda value: float(f"{value:.{DIGITS}g}"))(values)
     return rounded
-
-
-def _bandwidth_at_ripple(
-    task: TuningTask, law: str, rule: Callable[[float], TunedLaw], most: float, weight: float = 1.0
-) -> float:
-    def ripple(bandwidth: float) -> Array:
-        return linear_ripple(task, law, rule(bandwidth).gains, weight)
-
-    if np.any(ripple(LEAST_BANDWIDTH) > task.allowed):
-        return most
-    return largest_quiet(LEAST_BANDWIDTH, most, ripple, task.allowed)
-
-
-def _estimate_at_ripple(
-    task: TuningTask, design: EstimateDesign, for_observer: bool = False
-) -> EstimateDesign:
-    """Return an estimate with the largest weight of its low-pass, at most that of ``design``.
-
-    ``for_observer``: for `dob` in place of the laws with time-delay estimation.
-    """
-    if not for_observer:
-        linear = task.options.allowed_ripple * LINEAR_SHARE**0.5
-        task = replace(task, options=replace(task.options, noise_ripple=linear))
-
-    def ripple(weight: float) -> Array:
-        own = with_weight(task, design, weight)
-        if for_observer:
-            return linear_ripple(task, "dob", tune_dob(task, own).gains)
-        return linear_ripple(task, "tde_tsmc", tune_tde_tsmc(task, own).gains, weight)
-
-    weight = largest_quiet(LEAST_WEIGHT, design.weight, ripple, task.allowed)
-    return with_weight(task, design, weight)
-
-
-def _with_quiet_switching(task: TuningTask, law: str, design: EstimateDesign) -> TunedLaw:
-    def with_share(share: float) -> TunedLaw:
-        own = replace(design, gap=share * design.gap, error=share * design.error)
-        return WITH_ESTIMATE[law](task, own)
-
-    def ripple(share: float) -> Array:
-        return switching_ripple(task, law, with_share(share).gains, design.weight)
-
-    return with_share(largest_quiet(LEAST_SHARE, 1.0, ripple, task.allowed))

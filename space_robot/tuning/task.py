@@ -51,13 +51,6 @@ class TuningOptions:
     h_bar: str = CONSTANT
     """Inertia of the laws with time-delay estimation: `CONSTANT`, `NOMINAL`, or `AUTO`, the nominal
     one where no diagonal matrix will do."""
-    noise_ripple: float | None = None
-    """If set, every law has this ripple in place of at most ``ripple``, see `method`."""
-
-    @property
-    def allowed_ripple(self) -> float:
-        """``noise_ripple``, else ``ripple``."""
-        return self.noise_ripple or self.ripple
 
 
 @dataclass(frozen=True)
@@ -102,7 +95,7 @@ class TuningTask:
     @property
     def allowed(self) -> Array:
         """(m,) RMS force that noise may cause, N m."""
-        return self.options.allowed_ripple * self.demand.peak
+        return self.options.ripple * self.demand.peak
 
     @property
     def lag(self) -> float:

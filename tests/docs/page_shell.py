@@ -33,6 +33,7 @@ SHORTER = {
     r"fly .*(kill|stop)_": "--duration {}",
     r"fly": "--composed --duration 0.2",
     r"choose": "--law ctc --law pd --evaluations 2 --runs 2 --duration 1.1 --ripple 10 --workers 0",
+    r"gains tune --law": "--evaluations 2 --ripple 10",
     r"new .*(--(force|passive)|geared)": "--help",  # tests/laboratory/cli/test_new_command.py
     r"new (robot )?\S+\.(urdf|yaml)": "--law ctc --law pd --evaluations 1 --runs 2 --workers 0",
     r"reproduce": "--only tde_stc/1 --duration 0.2 --jobs 1",
@@ -79,13 +80,12 @@ NOT_RUN = {
     r"overrides=|sed -E ": "ROS 2 from apt: test_topics.py runs the sed",
     r"rerun\b": "a viewer of 100 MB",
     r"(git|mkdir -p ws|cp TraceableRobotModels|pip|python3 -m venv|sudo apt)\b": "from elsewhere",
-    r"for gains in": "3,000 flights",
     r"python docs/random_arms.py": "300 flights and 200 gain sets",
     r"python docs/flown": "its tables: tests/test_flown_pages.py",
     r"make\b|BAG_FUZZ_EXAMPLES": "runs these tests, or for long",
     r"nft\b": "the machine's firewall",
     r"dask\b|.*--scheduler": "a cluster: tests/laboratory/processes/test_pool.py has one",
-    r"python docs/law_league.py(?! --geared)": "4,000 flights",
+    r"python docs/law_league.py": "4,000 flights",
     r"python docs/ets_vii_tables.py": "450 flights: test_ets_vii.py flies some of them",
     r"python docs/campaign_statistics.py": "a minute: test_verdicts.py compares its table",
     r"python docs/view_picture.py": "a browser: tests/laboratory/view has one",
@@ -140,10 +140,6 @@ def _urdf_with_a_defect(folder: Path) -> None:
     (folder / "my_laws.py").write_text(files(DOCS / "manual/control_laws.md")["my_laws.py"])
 
 
-def _docs(folder: Path) -> None:
-    (folder / "docs").symlink_to(DOCS)
-
-
 def _slow_gains(folder: Path) -> None:
     (folder / "slow").mkdir()
     gains = {"ctc": {"k_p": [9.0], "k_d": [6.0]}}
@@ -158,7 +154,6 @@ GIVEN: dict[str, Callable[[Path], None]] = {
     "docs/manual/analysis.md": _bag_of_others,
     "docs/manual/namespaces.md": _bag_of_two,
     "docs/manual/urdf.md": _urdf,
-    "docs/rivals.md": _docs,
     "docs/measurements/reality.md": _slow_gains,
     "docs/your_robot.md": _urdf_with_a_defect,
 }

@@ -13,17 +13,10 @@ from hypothesis import strategies as st
 
 from space_robot.flight.plan import Flight, Scenario, resolve
 from space_robot.tuning.inertia import SAMPLING, Posture, inertia_along, postures_along
-from space_robot.tuning.method import LINEAR_SHARE, Tuned, tune
+from space_robot.tuning.method import Tuned, tune
 from space_robot.tuning.noise import Noise, listen
-from space_robot.tuning.ripple import linear_ripple, switching_ripple
 from space_robot.tuning.spectrum import eigenvalues
-from space_robot.tuning.task import (
-    ForceDemand,
-    TuningOptions,
-    TuningTask,
-    axis_inertia,
-    force_demand,
-)
+from space_robot.tuning.task import ForceDemand, TuningOptions, axis_inertia, force_demand
 from space_robot_msgs_py.errors import InputError
 
 Array = np.ndarray
@@ -104,31 +97,6 @@ def test_adrc_has_less_inertia_where_its_three_poles_would_be_unstable() -> None
     assert np.all(np.asarray(inertia) < h_bar)
     largest = eigenvalues(0.8 * scene("seven_joint")[0], np.asarray(inertia)).max()
     assert largest == pytest.approx(5.0, rel=0.01)
-
-
-def test_every_law_has_the_same_ripple_on_request() -> None:
-    """On the limiting axis, with switching terms; and the same W where that is asked for."""
-    inertia, postures, asked = scene()
-    noise = white(3e-6, 3e-6, 1500)
-    options = TuningOptions(0.05, 0.2, noise_ripple=0.05)
-    found = tune(inertia, postures, asked, options, PERIOD, noise)
-    task = TuningTask(inertia, postures, asked, options, PERIOD, noise)
-    weight = 1.0 - np.exp(-2.0 * np.pi * found.corner_hz * PERIOD)
-    linear = linear_ripple(task, "tde_tsmc", found.laws["tde_tsmc"].gains, weight) / asked.peak
-    assert linear.max() == pytest.approx(0.05 * LINEAR_SHARE**0.5, rel=0.05)
-    for law in ("tde_smc", "tde_tsmc", "tde_stc"):
-        share = switching_ripple(task, law, found.laws[law].gains, weight) / asked.peak
-        assert linear.max() < 1.05 * share.max() < 1.05 * 0.0525, law
-    largest = switching_ripple(task, "tde_smc", found.laws["tde_smc"].gains, weight) / asked.peak
-    assert largest.max() == pytest.approx(0.05, rel=0.05)  # its g had to be made smaller
-    for law in ("ctc", "ctc_smc", "dob", "pd", "pd_feedforward"):
-        share = linear_ripple(task, law, found.laws[law].gains, weight) / asked.peak
-        is_at_limit = found.laws[law].bandwidth > 99.0
-        assert share.max() == pytest.approx(0.05, rel=0.05) or (is_at_limit and share.max() < 0.05)
-    same = tune(inertia, postures, asked, TuningOptions(0.05, 0.2, bandwidth=2.0), PERIOD)
-    for law in ("ctc", "indi", "dob", "tde_tsmc"):
-        np.testing.assert_array_equal(same.laws[law].gains["k_p"], np.full(9, 4.0))
-    np.testing.assert_array_equal(same.laws["adrc"].gains["omega_c"], np.full(9, 2.0))
 
 
 @given(st.integers(0, 2**32 - 1), st.integers(2, 9))
