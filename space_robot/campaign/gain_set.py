@@ -19,8 +19,7 @@ from ..tuning.flexible import fast_inertia
 from ..tuning.gain_file import gain_files
 from ..tuning.inertia import SAMPLING, inertia_along, postures_along, sampled_reference
 from ..tuning.method import Tuned, tune
-from ..tuning.noise import listen
-from ..tuning.task import TuningOptions, force_demand
+from ..tuning.task import TuningOptions, force_demand, listen
 
 
 def tuned_set(

@@ -5,14 +5,15 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import lru_cache, partial
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..analysis.words import Metrics, limit_cycles, with_statistic
-from ..campaign.draws import Draws
+from ..campaign.row.fly import RowFlyer
+from ..campaign.row.row import Task
 from ..campaign.study import Study
 from ..campaign.verdicts.laws import PairedComparison, compare
 from ..flight.batch import fly_in_lanes
@@ -44,14 +45,6 @@ class Candidate(NamedTuple):
     """Of its trials."""
     folder: str
     """Its gain files."""
-
-
-class CandidateRuns(NamedTuple):
-    """Some runs of a law."""
-
-    law: str
-    """As in a campaign: ``LAW=GAINS``."""
-    runs: tuple[int, ...]
 
 
 @dataclass(frozen=True)
@@ -128,13 +121,13 @@ def fly_candidates(
         progress: see `run_all`.
     """
     laws = [f"{c.controller}={c.folder}" for c in candidates]
-    text = study.model_copy(update={"laws": laws}).model_dump_json(by_alias=True)
+    flyer = RowFlyer.of(study.model_copy(update={"laws": laws}), seed, runs)
     groups = [tuple(range(k, min(k + GROUP, runs))) for k in range(0, runs, GROUP)]
-    tasks = [CandidateRuns(law, group) for group in groups for law in laws]
-    flown = run_all(partial(_fly, text, seed, runs, criterion), tasks, workers, progress)
+    tasks = [tuple(Task(run, law) for run in group) for group in groups for law in laws]
+    flown = run_all(partial(_fly, flyer, criterion), tasks, workers, progress)
     by_law: dict[str, list[dict[str, float]]] = {law: [] for law in laws}
     for task, flights in zip(tasks, flown, strict=True):
-        by_law[task.law] += flights
+        by_law[task[0].law] += flights
     return [FlownCandidate(c, by_law[law]) for c, law in zip(candidates, laws, strict=True)]
 
 
@@ -158,17 +151,9 @@ def comparisons(order: Sequence[FlownCandidate], criterion: Criterion) -> list[P
     ]
 
 
-def _fly(
-    text: str, seed: int, runs: int, criterion: str, task: CandidateRuns
-) -> list[dict[str, float]]:
-    draws = _draws(text, seed, runs)
-    flights = [draws.flight(run, task.law) for run in task.runs]
+def _fly(flyer: RowFlyer, criterion: str, tasks: Sequence[Task]) -> list[dict[str, float]]:
+    flights = [flyer.draws.flight(task.run, task.law) for task in tasks]
     return [
         {} if flown.ending.error else CRITERIA[criterion].of(flown.log)
         for flown in fly_in_lanes(flights)
     ]
-
-
-@lru_cache(maxsize=2)
-def _draws(text: str, seed: int, runs: int) -> Draws:
-    return Draws(Study.model_validate_json(text), seed, runs)

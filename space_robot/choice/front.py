@@ -22,8 +22,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .search_space import SearchSpace
-from .surrogate import ALLOWED_SATURATION, Surrogates
-from .trials import Score, Trials
+from .surrogate import Surrogates
+from .trials import ALLOWED_SATURATION, Score, Trials
 
 Array = NDArray[np.float64]
 
@@ -72,7 +72,7 @@ class Front:
     def best(self) -> list[Tried]:
         """The gain sets that no other beats in both, by growing ripple."""
         flyable = sorted(
-            (t for t in self.tried if is_acceptable(t.score)),
+            (t for t in self.tried if t.score.is_flyable),
             key=lambda tried: (tried.score.ripple, tried.score.error),
         )
         front: list[Tried] = []
@@ -115,16 +115,6 @@ class Front:
             f"{full} with wheels at their limit"
         )
 
-    def error_at(self, ripple: float) -> float:
-        """Return the least error with at most a ripple; infinite: no gain set has so little."""
-        tried = self.within(ripple)
-        return tried.score.error if tried else math.inf
-
-
-def is_acceptable(score: Score) -> bool:
-    """Return True if a gain set flew all trials within the limits of joints and wheels."""
-    return score.is_flyable and score.saturation <= ALLOWED_SATURATION
-
 
 def search_front(
     trials: Trials,
@@ -154,7 +144,7 @@ def search_front(
         progress(len(scores))
 
     count = min(evaluations, max(BATCH, round(FIRST_DESIGN * evaluations / BATCH) * BATCH))
-    fly(first_design(space, count, random))
+    fly(_first_design(space, count, random))
     surrogates = Surrogates(space, goal.ripple)
     while (left := evaluations - len(front.tried)) > 0:
         part = (len(front.tried) - count) / (evaluations - count)
@@ -170,13 +160,12 @@ def search_front(
             if goal.error is not None:
                 own = goal._replace(error=goal.error / share)
             known = np.vstack([front.nearest(own).point, points])
-            proposed.append(propose(surrogates, known, own, length, random))
+            proposed.append(_propose(surrogates, known, own, length, random))
         fly(proposed)
     return front
 
 
-def first_design(space: SearchSpace, count: int, random: np.random.Generator) -> list[Array]:
-    """Return the tuned gains, and points around them and over the whole space."""
+def _first_design(space: SearchSpace, count: int, random: np.random.Generator) -> list[Array]:
     from scipy.stats import norm, qmc
 
     power = math.ceil(math.log2(count)) if count > 1 else 0
@@ -185,21 +174,12 @@ def first_design(space: SearchSpace, count: int, random: np.random.Generator) ->
     return [space.origin, *np.where(np.arange(count)[1:, None] % 3, near[1:], spread[1:])]
 
 
-def propose(
+def _propose(
     surrogates: Surrogates, known: Array, goal: Goal, length: float, random: np.random.Generator
 ) -> Array:
-    """Return a point (d,) for a goal, see the module.
-
-    Args:
-        surrogates: fitted.
-        known: (N, d) points tried, the first one is the middle of the region.
-        goal: on the front.
-        length: half the side of the region.
-        random: of candidates and deviations.
-    """
-    names = surrogates.names
+    # known (N, d): points tried, the first one is the middle of the region
     best: Array = known[0]
-    deviations = dict(zip(names, random.standard_normal(len(names)), strict=True))
+    deviations = surrogates.draw(random)
     shape = CANDIDATES, len(best)
     others = known[random.integers(len(known), size=CANDIDATES)]
     points = np.where(random.random(shape) < 0.5, others, best)

@@ -118,7 +118,7 @@ def prepare(
         raise InputError(f"a search needs {SHORTEST_S:g} s of flight or more, got {duration:g} s")
     search = replace(
         search,
-        torques=largest_torques(nominal),
+        torques=_largest_torques(nominal),
         friction=friction,
         duration=min(duration, max(options.trial_s, fast_at(nominal))),
         controls_base=nominal.controls_base,
@@ -142,8 +142,7 @@ def has_estimate(law: str) -> bool:
     return "h_bar" in kind.gain_descriptions() or kind.estimates_with_model
 
 
-def largest_torques(flight: Flight) -> dict[str, float]:
-    """Return the largest torque that a mission asks of each group of axes, N m or N."""
+def _largest_torques(flight: Flight) -> dict[str, float]:
     scenario = flight.scenario
     demand = force_demand(scenario.robots.controller, scenario.mission, [scenario.plant])
     columns = AnalysedLog(empty_log(flight, 0, 1, is_brief=True)).torque_columns
@@ -195,15 +194,9 @@ class LawSearch:
             with Path(self.tally).open("ab") as file:
                 file.write(bytes(count))
 
-        return search_front(
-            trials,
-            self.space(law),
-            options.goal,
-            options.evaluations,
-            options.seed,
-            (1.0,) if options.is_short else SHARES_OF_RIPPLE,
-            note,
-        )
+        goal, count, seed = options.goal, options.evaluations, options.seed
+        shares = (1.0,) if options.is_short else SHARES_OF_RIPPLE
+        return search_front(trials, self.space(law), goal, count, seed, shares, note)
 
     def fronts(self) -> list[Front]:
         """Return the front of each law; a progress line counts their gain sets."""
@@ -230,18 +223,11 @@ class LawSearch:
             corner = scenario.controller.acceleration_filter_hz
             start = GainPoint(scenario.law.gain_values, corner)
         assert start is not None
-        return SearchSpace(
-            find_law(controller),
-            start,
-            self.friction,
-            self.controls_base,
-            has_estimate(controller),
-            self.options.is_short,
-            self._slower(controller),
-        )
+        own, has_low_pass = find_law(controller), has_estimate(controller)
+        how = self.options.is_short, self._slower(controller)
+        return SearchSpace(own, start, self.friction, self.controls_base, has_low_pass, *how)
 
     def _slower(self, controller: str) -> float | None:
-        """Return the factor on the bandwidth of the start that gives the user's; None: free."""
         wanted = self.options.bandwidth
         if wanted is None:
             return None

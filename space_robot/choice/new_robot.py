@@ -289,11 +289,7 @@ def hinge_remark(robot: Robot, command: str, folder: Path) -> str:
         return ""
     texts = [f"{name}:{own['stiffness']:g},{own['damping']:g}" for name, own in names.items()]
     options = [word for text in texts for word in ("--passive", text)]
-    typed = shlex.split(command)
-    if not any(word == "--out" or word.startswith("--out=") for word in typed):
-        options += ["--out", str(folder)]
-    options += [] if "--force" in typed else ["--force"]
-    words = shlex.join(options)
+    words = shlex.join([*options, "--out", str(folder), "--force"])
     each = "each carries" if len(names) > 1 else "it carries"
     return (
         f"{', '.join(names)}: {each} one body on the base. If that is a panel on a hinge "

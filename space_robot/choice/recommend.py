@@ -11,10 +11,12 @@ import numpy as np
 
 from space_robot_control.controller.settings import OF_THE_SET
 
+from ..campaign.gain_set import write_set
 from ..campaign.study import Law, Study
 from ..campaign.verdicts.laws import PairedComparison
 from ..console.progress import counting_progress
 from ..flight.plan import Flight
+from ..processes.scratch_folder import ScratchFolder
 from ..tuning.method import Tuned
 from .candidates import Candidate, FlownCandidate, comparisons, fly_candidates, ranked
 from .criteria import CRITERIA
@@ -105,7 +107,7 @@ def recommend(
 
     Args:
         scenario: options of a `Scenario`, without law and gains.
-        folder: that exists, for the gains of the candidates.
+        folder: for the gains of the candidates.
         options: of the choice.
         command: the user's command, for the files' headers.
 
@@ -115,8 +117,10 @@ def recommend(
     Raises:
         InputError: the scenario cannot be flown, or it has no such law.
     """
-    search, nominal, tuned = prepare(scenario, folder, options, command)
-    names, searched = search.laws, search.fronts()
+    with ScratchFolder() as place:
+        search, nominal, tuned = prepare(scenario, Path(place), options, command)
+        names, searched = search.laws, search.fronts()
+    write_set(tuned, command, folder / TUNED_SET)
     fronts = {front.law: front for front in searched}
     out: dict[str, str] = {}
     candidates = []
@@ -138,10 +142,10 @@ def recommend(
     order = ranked(flown, criterion)
     out |= {each.law: each.reason for each in flown if each.reason}
     compared = comparisons(order, criterion) if order else []
-    found_law = Recommendation(
+    choice = Recommendation(
         dict(scenario), options, fronts, flown, order, compared, out, study.vary
     )
-    return found_law, tuned
+    return choice, tuned
 
 
 def candidates_study(

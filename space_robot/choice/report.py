@@ -25,8 +25,6 @@ from .recommend import Recommendation
 CAMPAIGN = "campaign.yaml"
 CAMPAIGN_LAWS, CAMPAIGN_RUNS = 4, 200
 """Laws and runs of the campaign that continues the comparison."""
-RIPPLES = (0.001, 0.003, 0.01, 0.03, 0.1)
-"""Ripples at which the table of fronts shows errors."""
 
 
 def candidates_table(choice: Recommendation, notes: Sequence[str] = ()) -> Table:
@@ -60,19 +58,6 @@ def candidates_table(choice: Recommendation, notes: Sequence[str] = ()) -> Table
     ]
     title = f"{criterion.text}, {choice.options.runs} draws"
     return Table(title, columns, [Group(rows)], notes)
-
-
-def fronts_table(choice: Recommendation) -> Table:
-    """Return the least error of each law at some ripples."""
-    rows = [
-        [law, *(_finite(front.error_at(share)) for share in RIPPLES)]
-        for law, front in choice.fronts.items()
-    ]
-    columns = [
-        Column("law", is_label=True),
-        *(Column(f"ripple {share:.1%}", "", ".3g") for share in RIPPLES),
-    ]
-    return Table.of("Least error in the trials with a ripple of at most", columns, rows)
 
 
 def report(choice: Recommendation) -> dict[str, Any]:
@@ -171,7 +156,7 @@ def write_report(choice: Recommendation, folder: Path, command: str) -> Path:
     text = template("space_robot.choice", "choice.html.j2").render(
         robot=str(choice.scenario.get("robot", "paper")),
         sentence=choice.sentence,
-        tables=[candidates_table(choice), fronts_table(choice)],
+        tables=[candidates_table(choice)],
         figure=figure,
         scenario=yaml.safe_dump(dict(choice.scenario), sort_keys=False),
         options=choice.options,

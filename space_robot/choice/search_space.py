@@ -47,11 +47,6 @@ def bandwidth(**powers: float) -> Factor:
     return Factor(BANDWIDTH, powers, 0.05, 50.0)
 
 
-def observer(gain: str) -> Factor:
-    """Return the factor on an observer's bandwidth."""
-    return Factor("observer", {gain: 1.0}, 0.0, 0.0, is_low_pass=True)
-
-
 DAMPING = Factor("damping", {"k_d": 1.0}, 0.4, 2.5, is_common=True)
 H_BAR = Factor("inertia of the estimate", {"h_bar": 1.0}, 0.05, 20.0)
 INTEGRAL = Factor("integral", {"k_i": 1.0}, 1e-3, 0.5, is_common=True)
@@ -87,12 +82,12 @@ KNOWN: Mapping[str, Sequence[Factor]] = {
     "indi": [bandwidth(k_p=2, k_d=1), DAMPING],
     "dob": [
         Factor("inertia", {"inertia": 1.0}, 0.05, 20.0),
-        observer("bandwidth"),
+        Factor("observer", {"bandwidth": 1.0}, 0.0, 0.0, is_low_pass=True),
         bandwidth(k_p=2, k_d=1),
     ],
     "adrc": [
         Factor("inertia", {"inertia": 1.0}, 0.05, 20.0),
-        observer("omega_o"),
+        Factor("observer", {"omega_o": 1.0}, 0.0, 0.0, is_low_pass=True),
         bandwidth(omega_c=1),
     ],
     "tde_smc": [H_BAR, bandwidth(lambda_=1), Factor("switching", {"g": 1.0}, 1e-3, 30.0)],

@@ -11,14 +11,14 @@ from __future__ import annotations
 import math
 import warnings
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .criteria import mean_log
 from .search_space import BASE, JOINTS, SearchSpace
-from .trials import Score
+from .trials import ALLOWED_SATURATION, Score
 
 if TYPE_CHECKING:
     from sklearn.gaussian_process import GaussianProcessRegressor
@@ -32,19 +32,9 @@ OWN_LENGTH, OTHER_LENGTH = 0.4, 4.0
 """First length scales, of gains of the same axes or all, and of the other axes."""
 OF_THE_BASE = ("attitude", "base_torque")
 """Beginnings of the names of errors and torques that are the base's."""
-ALLOWED_SATURATION = 0.01
-"""Largest share of ticks with a wheel at its limit."""
 SATURATION_WEIGHT, BEYOND, FAILED = 20.0, 3.0, 1.0
 """What is added to logarithms: of each ripple by the share of saturation beyond that, and by a
 joint beyond its effort; of all values by a flight that ended early, on the largest."""
-
-
-class Process(NamedTuple):
-    """A Gaussian process of values with a mean and a scale."""
-
-    process: GaussianProcessRegressor
-    mean: float
-    scale: float
 
 
 class Surrogates:
@@ -58,7 +48,7 @@ class Surrogates:
             allowed: ripple, relative to which ripples are.
         """
         self._space, self._allowed = space, math.log(allowed)
-        self._processes: dict[str, Process] = {}
+        self._processes: dict[str, tuple[GaussianProcessRegressor, float, float]] = {}
         self._errors: tuple[str, ...] = ()
 
     def fit(self, points: Array, scores: Sequence[Score]) -> bool:
@@ -70,21 +60,24 @@ class Surrogates:
         for name in (*flown.errors, *flown.ripples):
             values = self._compressed(name, scores)
             mean, scale = float(np.mean(values)), float(np.std(values)) or 1.0
-            last = self._processes.get(name)
-            process = last.process if last else self._new_process(name)
+            process, _, _ = self._processes.get(name) or (self._new_process(name), 0.0, 1.0)
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore")  # a length scale at its bound: no influence
                 process.fit(points, (values - mean) / scale)
             process.kernel = process.kernel_  # from which the next fit begins
-            self._processes[name] = Process(process, mean, scale)
+            self._processes[name] = process, mean, scale
         return True
+
+    def draw(self, random: np.random.Generator) -> dict[str, float]:
+        """Draw how far each process is off its mean, in standard deviations."""
+        return {name: random.standard_normal() for name in self._processes}
 
     def predict(self, points: Array, deviations: Mapping[str, float]) -> tuple[Array, Array]:
         """Return logarithms (N,) of error and ripple.
 
         Args:
             points: (N, d).
-            deviations: of each process from its mean, in standard deviations.
+            deviations: see `draw`.
         """
         values = {}
         for name, (process, mean, scale) in self._processes.items():
@@ -92,11 +85,6 @@ class Surrogates:
             values[name] = mean + scale * (own + deviations[name] * deviation)
         error = mean_log({name: values.pop(name) for name in self._errors})
         return error, np.max(list(values.values()), axis=0) + self._allowed
-
-    @property
-    def names(self) -> list[str]:
-        """The processes' names."""
-        return list(self._processes)
 
     def _compressed(self, name: str, scores: Sequence[Score]) -> Array:
         """Return values (N,), with what is far above the useful ones brought nearer."""

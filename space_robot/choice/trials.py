@@ -28,6 +28,9 @@ from .search_space import GainPoint
 
 Array = NDArray[np.float64]
 
+ALLOWED_SATURATION = 0.01
+"""Largest share of ticks with a wheel at its limit."""
+
 
 class Deviation(NamedTuple):
     """Factors on the numbers of a nominal flight."""
@@ -105,8 +108,8 @@ class Score(NamedTuple):
 
     @property
     def is_flyable(self) -> bool:
-        """True if no trial ended early or went beyond the joints' limits."""
-        return self.flown >= 1.0 and not self.beyond
+        """True if all trials were flown within the limits of joints and wheels."""
+        return self.flown >= 1.0 and not self.beyond and self.saturation <= ALLOWED_SATURATION
 
 
 class Trials:

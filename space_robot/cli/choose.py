@@ -9,7 +9,7 @@ from typing import Any
 
 import click
 
-from .gains import WORDS, TypedCommand
+from .gains import MASS_UNCERTAINTY, WORDS, TypedCommand
 from .option_types import FiniteRange, names_in
 from .options import Decorator, flight_options, folder_option
 
@@ -73,13 +73,7 @@ def search_options(evaluations: int, runs: int) -> Decorator:
 )
 @search_options(evaluations=160, runs=24)
 @click.option("--seed", type=click.IntRange(0), default=1, show_default=True, help="Of all draws.")
-@click.option(
-    "--mass-uncertainty",
-    type=FiniteRange(0.0, 0.9),
-    default=0.2,
-    show_default=True,
-    help="Share by which each mass and inertia may be wrong.",
-)
+@MASS_UNCERTAINTY
 @folder_option("--out", help="Folder to write [default: ROBOT/choice, choices/ROBOT if shipped].")
 @click.pass_context
 def choose(
@@ -115,7 +109,6 @@ def choose(
 
     from ..choice import ChoiceOptions, Uncertainty, recommend
     from ..choice.report import CAMPAIGN, candidates_table, report, write_report
-    from ..console.files import new_folder
     from ..console.terminal import echo_json, print_table, terminal
     from ..flight.compilation import compile_lanes
     from ..processes.executor import cores
@@ -140,8 +133,7 @@ def choose(
     )
     command = shlex.join(["space-robot", "choose", *context.meta[WORDS]])
     compile_lanes()
-    with new_folder(folder):
-        choice, _ = recommend(scenario, folder, wanted, command)
+    choice, _ = recommend(scenario, folder, wanted, command)
     page = write_report(choice, folder, command)
     chosen = (
         choice.install(folder, files.gains)

@@ -22,9 +22,8 @@ from ..flight.plan import Flight, Scenario, resolve
 from ..flight.simulate import simulate
 from ..scenario.node_settings import FlightSettings
 from ..tuning.flexible import FlexibleMotions, check_flexible
-from ..tuning.gain_check import GainCheck, check_gains, estimated_with, pair_corner
+from ..tuning.gain_check import LEAST_MARGIN, GainCheck, Spectrum, check_gains, pair_corner
 from ..tuning.inertia import SAMPLING, inertia_along, postures_along, sampled_reference
-from ..tuning.spectrum import COARSE, DRAWS, LEAST_MARGIN, check_masses, drawn_inertias
 
 Array = NDArray[np.float64]
 
@@ -49,6 +48,8 @@ class CheckedGains:
 
     estimates: dict[str, int]
     """By law: the kind of its time-delay estimate."""
+    mass_uncertainty: float
+    """Share by which masses and inertias may be wrong."""
 
     @property
     def is_sound(self) -> bool:
@@ -103,7 +104,10 @@ def check_laws(options: dict[str, Any], mass_uncertainty: float = 0.2) -> Checke
     flight = Flight(resolve(plan))
     laws = list(flight.laws.values()) if every else [flight.law]
     corner = pair_corner(flight.controller_settings)
-    checks = _on_rigid_robot(flight, laws, corner, mass_uncertainty)
+    robot, mission, has_base = flight.plant.robot, flight.mission_settings, flight.controls_base
+    inertia = inertia_along(robot, mission, controls_base=has_base)
+    postures = postures_along(flight.robot, mission, SAMPLING, has_base)
+    checks = [check_gains(law, inertia, postures, corner) for law in laws]
     frequencies: dict[str, tuple[float, float]] = {}
     if any(flight.plant.robot.gears):
         checks, frequencies = with_gears(flight, checks, laws, corner)
@@ -115,27 +119,7 @@ def check_laws(options: dict[str, Any], mass_uncertainty: float = 0.2) -> Checke
             for check, name in zip(checks, names, strict=True)
         }
     estimates = {law.name: law.estimate for law in laws}
-    return CheckedGains(flight, checks, ripple, frequencies, estimates)
-
-
-def _on_rigid_robot(
-    flight: Flight, laws: Sequence[ControlLaw], corner: float, mass_uncertainty: float
-) -> list[GainCheck]:
-    """Check laws without the gears of the robot."""
-    robot, mission, has_base = flight.plant.robot, flight.mission_settings, flight.controls_base
-    inertia = inertia_along(robot, mission, controls_base=has_base)
-    postures = postures_along(flight.robot, mission, SAMPLING, has_base)
-    coarse = postures_along(flight.robot, mission, COARSE, has_base)
-    drawn = drawn_inertias(robot, mission, mass_uncertainty, COARSE, has_base)
-    checks = []
-    for law in laws:
-        check = check_gains(law, inertia, postures, corner)
-        assumed = estimated_with(law, coarse, drawn.shape[1])
-        if check.spectrum and assumed is not None:
-            masses = check_masses(check.spectrum, assumed, drawn, mass_uncertainty)
-            check = replace(check, masses=masses)
-        checks.append(check)
-    return checks
+    return CheckedGains(flight, checks, ripple, frequencies, estimates, mass_uncertainty)
 
 
 def with_gears(
@@ -220,8 +204,9 @@ def _law_entries(check: GainCheck, checks: CheckedGains) -> Iterable[tuple[str, 
     elif check.margin is not None:
         yield "torque_scale_margin", check.margin
         yield "largest_torque_scale", check.loop.largest_scale
-    if masses := check.masses:
-        yield "wrong_masses", asdict(masses)
+    if check.spectrum:
+        bounds = _wrong_masses(check.spectrum, share := checks.mass_uncertainty)
+        yield "wrong_masses", dict(zip(WRONG, (share, *bounds), strict=True))
     yield "loop_radius", check.loop.radius
     if flexible := check.flexible:
         yield "flexible", {"is_stable": flexible.is_stable, **asdict(flexible)}
@@ -229,6 +214,13 @@ def _law_entries(check: GainCheck, checks: CheckedGains) -> Iterable[tuple[str, 
     if checks.ripple:
         ripple = checks.ripple[check.law]
         yield "held_ripple", None if ripple is None else ripple.tolist()
+
+
+WRONG = ("share", "smallest", "largest")
+
+
+def _wrong_masses(spectrum: Spectrum, share: float) -> tuple[float, float]:
+    return spectrum.smallest / (1.0 + share), spectrum.largest / (1.0 - share)
 
 
 def print_checks(checks: CheckedGains, console: Console) -> None:
@@ -246,16 +238,12 @@ def print_checks(checks: CheckedGains, console: Console) -> None:
 def _tables(checks: CheckedGains) -> Iterator[Table]:
     if any(check.spectrum for check in checks.checks):
         yield _margins(checks)
-        masses = {check.law: check.masses for check in checks.checks if check.masses}
-        rows: list[list[Any]] = [
-            [law, own.smallest, own.largest, own.smallest_drawn, own.largest_drawn]
-            for law, own in masses.items()
-        ]
-        names = ("smallest", "largest", "smallest\ndrawn", "largest\ndrawn")
-        share = next(iter(masses.values())).share
+        share = checks.mass_uncertainty
+        own = [(check.law, check.spectrum) for check in checks.checks if check.spectrum]
+        rows = [[law, *_wrong_masses(spectrum, share)] for law, spectrum in own]
         title = f"The same with masses and inertias wrong by {share:.0%}"
-        note = f"Bounds for all such robots, and the extremes of {DRAWS} drawn at random."
-        columns = named(), *(Column(name, spec=".4f") for name in names)
+        columns = named(), *(Column(name, spec=".4f") for name in ("smallest", "largest"))
+        note = "Bounds for all such robots."
         yield Table.of(title, columns, rows, note)
     yield _loops(checks)
     if checks.frequencies:

@@ -49,23 +49,6 @@ def make_folder(path: Path) -> None:
         raise InputError(f"{path}: the folder cannot be created ({error.strerror})") from None
 
 
-@contextmanager
-def new_folder(path: Path) -> Iterator[None]:
-    """Create a folder and its parents; what did not exist is removed if the block raises.
-
-    Raises:
-        InputError: it cannot be created.
-    """
-    created = [folder for folder in (path, *path.parents) if not folder.exists()]
-    make_folder(path)
-    try:
-        yield
-    except BaseException:
-        for folder in created[-1:]:
-            shutil.rmtree(folder, ignore_errors=True)
-        raise
-
-
 def check_writable(path: Path) -> None:
     """Check that a file can be written or replaced.
 

@@ -39,7 +39,7 @@ from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.errors import InputError
 
 from ..flight.plan import NO_FRICTION, Flight, Scenario, resolve
-from ..tuning.spectrum import contraction_matrix
+from ..tuning.gain_check import contraction_matrix
 from .lyapunov import Certificate, certify, largest_tolerated_beta, paper_m, peak_gain, residual
 
 Array = NDArray[np.float64]

@@ -5,8 +5,6 @@
 | `inertia` | the inertia H_S along a mission, and the postures of the nominal robot |
 | `linear_law`, `closed_loop` | the linear part of a law, from its code; its loop on a rigid robot |
 | `flexible` | the same loop with the springs of gears |
-| `spectrum` | convergence of a time-delay estimate, also with wrong masses |
-| `gain_check`, `warning` | the check of given gains; remarks before a flight |
-| `noise` | noise and lag of the sensors |
-| `method` | a new set: `task`, `estimate_design`, `law_gains`; its texts: `gain_file` |
+| `gain_check`, `warning` | the check of given gains, margins; remarks before a flight |
+| `method` | a new set: `task` with the noise, `estimate_design`, `law_gains`; `gain_file` |
 """

@@ -12,9 +12,8 @@ from numpy.typing import NDArray
 from space_robot_msgs_py.errors import InputError
 
 from .closed_loop import bisect
-from .noise import Noise
-from .spectrum import eigenvalues
-from .task import CONSTANT, MOST_PER_TICK, NOMINAL, SEPARATION, TuningTask
+from .gain_check import eigenvalues
+from .task import CONSTANT, MOST_PER_TICK, NOMINAL, SEPARATION, Noise, TuningTask
 
 Array = NDArray[np.float64]
 
@@ -116,18 +115,9 @@ def _design(
     else:
         error = (np.abs(np.linalg.inv(task.inertia)) @ gap).max(axis=0)
         switching = _switching_share(task, bandwidth * error)
+    forces = gap, switching * error, switching
     return EstimateDesign(
-        kind,
-        h_bar,
-        smallest,
-        largest,
-        weight,
-        delay,
-        fastest,
-        bandwidth,
-        gap,
-        switching * error,
-        switching,
+        kind, h_bar, smallest, largest, weight, delay, fastest, bandwidth, *forces
     )
 
 

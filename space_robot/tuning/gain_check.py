@@ -3,7 +3,7 @@
 Each law gets three results:
 
 - Its **margin** against a wrong torque scale, if what it commands depends on the applied force. For
-  time-delay estimation it is the smallest eigenvalue of `spectrum`, likewise for a disturbance
+  time-delay estimation it is the smallest eigenvalue of ``H_S^-1 H^``, likewise for a disturbance
   observer; for any other law with an observer, such as `adrc`, it is the largest excess of the
   reported torque with which the loop of `closed_loop` is stable.
 - The **radius** of that loop, of small motions of the rigid robot under the linear part of the law.
@@ -15,6 +15,34 @@ The effect of noise on switching terms depends on its size: ``g sign(s)`` adds u
 roots of super-twisting and of the terminal sliding mode add ``h_bar K_1 |s|^1/2``. The torque on
 the base, about its axes, is ``J0^T F``, and rhodot is ``J0 omega_e``. A base without attitude
 actuators has no torques, and the joints have the inertia H_f of `inertia`.
+
+Margin
+------
+H^ is the inertia of a law's time-delay estimate: the constant diagonal ``h_bar``, or the nominal
+model's H_S. Over a tick the robot obeys ``H_S a_k + c = G_k``, G the actual force and a the mean
+acceleration; the law commands ``C_k = H^ u_k + N_hat_k``. Let a drive produce ``G = a_g C`` and
+report ``R = b C``. With the weight w of the pair's low-pass (1: none), (36) is
+
+    N_hat_k = (1 - w) N_hat_k-1 + w (R_k-1 - h_bar a_k-1)
+            = ((1 + w (b - 1)) E - w a_g h_bar H_S^-1) N_hat_k-1 + terms of u and c,
+
+so along an eigenvector of ``h_bar H_S^-1``, whose eigenvalues lambda are those of ``H_S^-1 h_bar``
+and positive, an error of the estimate is multiplied in each tick by
+
+    1 + w (b - 1 - a_g lambda).                                                             (*)
+
+With correct torques and w = 1 this is ``1 - lambda``, Lemma 1's W (69). With a reported torque too
+large, ``b = 1 + g``, it diverges for ``g >= min lambda``: the estimate takes the excess for a force
+that did not accelerate the robot, and commands it again. With a wrong actual torque and the command
+reported it converges for ``a_g < 2 / (w max lambda)``.
+
+Hence the margin in torque scale is the smallest eigenvalue. If all masses and inertias have
+relative errors of at most mu, then ``(1 - mu) H_S <= H_S' <= (1 + mu) H_S``, because the kinetic
+energy is linear in them and a free base minimises it: every eigenvalue stays between
+``lambda / (1 + mu)`` and ``lambda / (1 - mu)``. A disturbance observer of inertia J and bandwidth
+g, `dob`, is the estimate with ``H^ = J`` and ``w = g period / (1 + g period)``; with a weight for
+each axis the first factor reaches 1 at the smallest lambda, too (Sylvester). The terms of u move
+the limit by the order of the law's bandwidth times ``period / w``; `closed_loop` has them all.
 """
 
 from __future__ import annotations
@@ -34,12 +62,96 @@ from .closed_loop import SLOWEST_GROWTH, RigidLoop
 from .flexible import FlexibleCheck
 from .inertia import J0, Posture
 from .linear_law import linear_laws
-from .spectrum import LEAST_MARGIN, MassCheck, Spectrum, spectrum
 
 Array = NDArray[np.float64]
 
 LOOPS = 31
 """Largest number of postures in which the loop is closed."""
+
+
+LEAST_MARGIN = 0.02
+"""Smallest acceptable margin in torque scale: drives are calibrated to about a percent."""
+
+
+@dataclass(frozen=True)
+class Spectrum:
+    """Extreme eigenvalues of ``H_S^-1 H^`` over all configurations."""
+
+    smallest: float
+    largest: float
+    norm: float
+    """Largest spectral norm of ``E - H_S^-1 H^``, below 1 by Lemma 1."""
+    weight: float = 1.0
+    """Weight w of the low-pass of the estimate, see `low_pass_weight`; 1: none. Of an observer with
+    different weights: the largest."""
+    least_weight: float | None = None
+    """The smallest of these; None: the same."""
+
+    @property
+    def radius(self) -> float:
+        """Largest factor (*) of an error per tick, or its bound if axes have different weights.
+
+        The estimate converges if it is below 1.
+        """
+        least = self.weight if self.least_weight is None else self.least_weight
+        return max(abs(1.0 - least * self.smallest), abs(1.0 - self.weight * self.largest))
+
+    @property
+    def margin(self) -> float:
+        """Share by which the reported torque may exceed the commanded one; negative: unstable."""
+        return self.smallest if self.contracts else 1.0 - self.radius
+
+    @property
+    def largest_scale(self) -> float:
+        """Largest stable ratio of actual to commanded torque, if the command is reported."""
+        return 2.0 / (self.weight * self.largest)
+
+    @property
+    def contracts(self) -> bool:
+        """True if the radius is below 1."""
+        return self.radius < 1.0
+
+    @property
+    def is_sound(self) -> bool:
+        """True if the estimate converges with a margin of at least `LEAST_MARGIN`."""
+        return self.contracts and self.margin >= LEAST_MARGIN
+
+
+def spectrum(inertia: Array, assumed: Array, weight: float | Array = 1.0) -> Spectrum:
+    """Return the `Spectrum` over ``inertia`` (K, m, m), H_S.
+
+    Args:
+        inertia: of the robot.
+        assumed: H^ of the estimate: (m,) diagonal, or (K, m, m).
+        weight: w of its low-pass, or (m,) for a diagonal H^.
+    """
+    eigen = eigenvalues(inertia, assumed)
+    norm = np.linalg.norm(contraction_matrix(inertia, assumed), 2, axis=(-2, -1))
+    extremes = float(eigen.min()), float(eigen.max()), float(norm.max())
+    weights = np.atleast_1d(np.asarray(weight, dtype=np.float64))
+    if np.all(weights == weights[0]):
+        return Spectrum(*extremes, float(weights[0]))
+    return Spectrum(*extremes, float(weights.max()), float(weights.min()))
+
+
+def eigenvalues(inertia: Array, assumed: Array) -> Array:
+    """Return the ascending eigenvalues (..., m) of ``H_S^-1 H^`` for H_S (..., m, m).
+
+    They are those of the symmetric ``L^T H_S^-1 L`` with ``H^ = L L^T``.
+
+    Args:
+        inertia: H_S.
+        assumed: H^, (m,) diagonal or (..., m, m).
+    """
+    root = np.diag(np.sqrt(assumed)) if assumed.ndim == 1 else np.linalg.cholesky(assumed)
+    similar = root.swapaxes(-1, -2) @ np.linalg.inv(inertia) @ root
+    return np.linalg.eigvalsh(0.5 * (similar + similar.swapaxes(-1, -2)))
+
+
+def contraction_matrix(inertia: Array, assumed: Array) -> Array:
+    """Return ``W = E - H_S^-1 H^`` (69) of H_S (..., m, m) and H^, (m,) diagonal or (..., m, m)."""
+    whole = np.diag(assumed) if assumed.ndim == 1 else assumed
+    return np.eye(inertia.shape[-1]) - np.linalg.solve(inertia, whole)
 
 
 @dataclass(frozen=True)
@@ -78,8 +190,6 @@ class GainCheck:
     """(m,) torque per unit of noise on the rate of the same axis, N m s."""
     flexible: FlexibleCheck | None = None
     """Stability on a robot with gears; None for one without."""
-    masses: MassCheck | None = None
-    """Eigenvalues with wrong masses; None for a law without time-delay estimation."""
 
     @property
     def is_sound(self) -> bool:

@@ -57,28 +57,25 @@ def estimate_remark(tuned: Tuned) -> str:
     Its laws with time-delay estimation are then weak, with less than a tenth of the bandwidth of
     those with a model, or they have the nominal inertia.
     """
-    design = tuned.design
+    design, constant = tuned.design, tuned.constant
+    eigen = f"eigenvalues of H_S^-1 h_bar {constant.smallest:.2g} to {constant.largest:.3g}"
     if design.kind == NOMINAL:
         if tuned.options.h_bar != AUTO:
             return ""
         return (
-            "The laws with time-delay estimation use the inertia of the nominal model (h_bar: "
-            "nominal), because no diagonal h_bar suits light and heavy directions of this robot at "
-            f"once: eigenvalues of H_S^-1 h_bar would be {tuned.constant.smallest:.2g} to "
-            f"{tuned.constant.largest:.3g}, with {tuned.constant.bandwidth:.2g} rad/s. dob and "
-            "adrc, whose inertia is a diagonal, too, are weak: "
-            f"{tuned.laws['dob'].bandwidth:.2g} and {tuned.laws['adrc'].bandwidth:.2g} rad/s."
+            "The laws with time-delay estimation use the inertia of the nominal model, because no "
+            f"diagonal h_bar suits light and heavy directions of this robot at once ({eigen}); dob "
+            f"and adrc have one, and {tuned.laws['dob'].bandwidth:.2g} and "
+            f"{tuned.laws['adrc'].bandwidth:.2g} rad/s."
         )
     if design.bandwidth >= MUCH_SLOWER * tuned.model_bandwidth:
         return ""
     return (
         f"The laws with time-delay estimation are weak: {design.bandwidth:.2g} rad/s, those with a "
-        f"model {tuned.model_bandwidth:.2g}. Eigenvalues of H_S^-1 h_bar are {design.smallest:.2g} "
-        f"to {design.largest:.3g} (no diagonal h_bar suits light and heavy directions at once), so "
-        f"the estimate needs a low-pass and lags by {design.delay * 1e3:.3g} ms. What helps: the "
-        "inertia of the nominal model (gains tune --h-bar nominal); ctc or ctc_smc; panels on "
-        "hinges without motors as passive joints; a smaller margin or mass uncertainty (--margin, "
-        "--mass-uncertainty), where drives and masses are known that well; a shorter period."
+        f"model {tuned.model_bandwidth:.2g} (no diagonal h_bar suits light and heavy directions at "
+        f"once: {eigen}, lag {design.delay * 1e3:.3g} ms). What helps: gains tune --h-bar nominal; "
+        "panels on hinges without motors as passive joints; a smaller --margin or "
+        "--mass-uncertainty; a shorter period."
     )
 
 

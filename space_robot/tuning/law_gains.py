@@ -12,8 +12,8 @@ from space_robot_control.laws import find_law
 
 from .closed_loop import RigidLoop, linear_loop, rigid_motion
 from .estimate_design import K_1_FACTOR, EstimateDesign
+from .gain_check import eigenvalues
 from .linear_law import linear_law
-from .spectrum import eigenvalues
 from .task import SEPARATION, TuningTask
 
 Array = NDArray[np.float64]

@@ -1,11 +1,11 @@
-"""Tuning of a gain set for all laws, in seven steps.
+"""Tuning of a gain set for all laws, in six steps.
 
 1. **Shape of h_bar.** ``d_i``, the smallest inertia of axis i when all others are free,
    ``1 / (H_S^-1)_ii``, along the mission and with every payload. The ratio of the extreme
    eigenvalues of ``H_S^-1 h_bar`` is then within a factor m of the best diagonal matrix
    (van der Sluis 1969).
 2. **Size of h_bar.** The smallest ``h_bar = alpha d`` that leaves the margin in torque scale (see
-   `spectrum`) with a mass error mu: ``alpha min(lambda) / (1 + mu) = margin``. It is the smallest
+   `gain_check`) with a mass error mu: ``alpha min(lambda) / (1 + mu) = margin``. It is the smallest
    because noise is proportional to h_bar.
 3. **Low-pass of the time-delay pair.** The largest eigenvalue may then exceed 1 or even 2. With a
    low-pass of weight w the estimate's error is multiplied by ``1 - w lambda`` per tick. w is the
@@ -22,26 +22,8 @@
 5. **Errors of the estimate.** Within a tick the estimate has the error
    ``h_bar eps = T dF_S/dt + (1 - b) F_S``, with b the reported share of the torque, assumed wrong
    by half of the margin. F_S is that of inverse dynamics along the mission.
-6. **Laws.** ``K_P = W^2``, ``K_D = 2 W``, ``lambda = W``. The rate of eps within the bandwidth is
-   ``L = W eps``. TDE-SMC: ``g = h_bar eps``, the smallest gain that can hold the surface. TDE-STC:
-   ``K_2 = 1.1 L`` of Levant (1998), and ``K_1 = 2.2 L^1/2`` for the paper's ``K_1^2 > 4 K_2``.
-   TDE-TSMC: ``K_1 = L^1/2``, which balances eps at ``|s| = eps / W``. CTC-SMC: g is the force that
-   the nominal model does not contain; the boundary layer is that of Slotine and Li (1991, 7.2):
-   inside it s decays with rate W, and not faster in any direction, ``Delta = g / (W d')`` with
-   ``d'`` proportional to the shape of h_bar and ``H_S^-1 d' <= E``.
-7. **Laws without h_bar.** W is that of the laws with a model, or of those with an estimate:
-
-   - PD, with and without feedforward: ``K_D = 2 W d``, ``K_P = W^2 d``, the noise is multiplied by
-     d in place of H_S.
-   - Slotine and Li (1987): ``lambda = W``, ``K_D = W d``; gamma adapts with a bandwidth of W / 6
-     at the largest force of the mission (`law_gains`); spread is mu.
-   - Disturbance observer: J is h_bar, g has the weight of the pair's low-pass, so that it equals
-     the time-delay estimate (`spectrum`).
-   - Active disturbance rejection: J is h_bar, but with ``max(lambda) / (1 - mu) <= 5``; omega_o has
-     the lag of the pair's low-pass, ``3 / omega_o``, or less noise; ``omega_c = W``, at most
-     ``omega_o / 4``, and slower where the loop is not stable (`law_gains`).
-   - INDI: the estimate with the nominal inertia and the low-pass of the set; its W by step 4 with
-     ``min(lambda) / (1 + mu)`` in place of the margin, at most that of the laws with a model.
+6. **Laws.** ``K_P = W^2``, ``K_D = 2 W``, ``lambda = W``; W is that of the laws with a model, or of
+   those with an estimate. `law_gains` has the rules of each law.
 
 **Gears.** H_S is also taken with the motors moving without the links behind their springs, as
 within a tick (`flexible.fast_inertia`). A law with a model multiplies its K_D by the whole inertia,
@@ -88,8 +70,7 @@ from .law_gains import (
     tune_dob,
     tune_indi,
 )
-from .noise import Noise
-from .task import AUTO, NOMINAL, ForceDemand, TuningOptions, TuningTask, axis_inertia
+from .task import AUTO, NOMINAL, ForceDemand, Noise, TuningOptions, TuningTask, axis_inertia
 
 Array = NDArray[np.float64]
 

@@ -18,10 +18,9 @@ from space_robot_model.robot import Robot
 from space_robot_msgs_py.errors import InputError
 
 from .closed_loop import RigidLoop
-from .gain_check import estimate_spectrum
+from .gain_check import LEAST_MARGIN, estimate_spectrum
 from .inertia import Posture, inertia_along, postures_along, semi_floating_inertia
 from .linear_law import linear_law
-from .spectrum import LEAST_MARGIN
 
 Array = NDArray[np.float64]
 

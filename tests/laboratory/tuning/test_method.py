@@ -12,11 +12,17 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from space_robot.flight.plan import Flight, Scenario, resolve
+from space_robot.tuning.gain_check import eigenvalues
 from space_robot.tuning.inertia import SAMPLING, Posture, inertia_along, postures_along
 from space_robot.tuning.method import Tuned, tune
-from space_robot.tuning.noise import Noise, listen
-from space_robot.tuning.spectrum import eigenvalues
-from space_robot.tuning.task import ForceDemand, TuningOptions, axis_inertia, force_demand
+from space_robot.tuning.task import (
+    ForceDemand,
+    Noise,
+    TuningOptions,
+    axis_inertia,
+    force_demand,
+    listen,
+)
 from space_robot_msgs_py.errors import InputError
 
 Array = np.ndarray
