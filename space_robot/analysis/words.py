@@ -42,11 +42,8 @@ def flown(described: Mapping[str, Any]) -> str:
 
 def analyzed(report: Report) -> str:
     """Say how much was analyzed, and what share of the flight that is if it is not all of it."""
-    ticks, flight_ticks, seconds = (
-        report["ticks"],
-        report["flight_ticks"],
-        f"{report['duration_s']:g} s",
-    )
+    ticks, flight_ticks = report["ticks"], report["flight_ticks"]
+    seconds = f"{report['duration_s']:g} s"
     if ticks == flight_ticks:
         return f"{ticks} ticks, {seconds}"
     return f"{ticks / flight_ticks:.1%} of the flight, {ticks} of {flight_ticks} ticks, {seconds}"

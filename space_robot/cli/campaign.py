@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from .option_types import FiniteRange, names_in
-from .options import file_option, flight_option, folder_option
+from .options import WORKERS, file_option, flight_option, folder_option
 
 if TYPE_CHECKING:
     from ..campaign.flown.flights import Progress
@@ -44,11 +44,7 @@ FOLDER = click.argument("folder", type=click.Path(path_type=Path), metavar="DIR"
     "--out",
     help="Folder of the campaign; one that was begun is gone on with [default: campaigns/NAME].",
 )
-@click.option(
-    "--workers",
-    type=click.IntRange(0, 1024),
-    help="Processes that fly; 0: this one alone [default: one a core].",
-)
+@WORKERS
 @click.option(
     "--scheduler",
     metavar="ADDRESS",

@@ -11,7 +11,7 @@ import click
 
 from .gains import MASS_UNCERTAINTY, WORDS, TypedCommand
 from .option_types import FiniteRange, names_in
-from .options import Decorator, flight_options, folder_option
+from .options import WORKERS, Decorator, flight_options, folder_option
 
 
 def search_options(evaluations: int, runs: int) -> Decorator:
@@ -39,11 +39,7 @@ def search_options(evaluations: int, runs: int) -> Decorator:
             show_default=True,
             help="Draws that every law flies with its best gains.",
         ),
-        click.option(
-            "--workers",
-            type=click.IntRange(0, 1024),
-            help="Processes that fly; 0: this one alone [default: one a core].",
-        ),
+        WORKERS,
     )
     return lambda command: reduce(lambda inner, option: option(inner), reversed(options), command)
 

@@ -138,6 +138,11 @@ BASE = click.option("--base", metavar="LINK", help="The satellite, of a URDF [de
 REPAIR = click.option(
     "--repair", is_flag=True, help="Repair and list the repairable defects of a URDF."
 )
+WORKERS = click.option(
+    "--workers",
+    type=click.IntRange(0, 1024),
+    help="Processes that fly; 0: this one alone [default: one a core].",
+)
 
 
 def _click_option(name: str) -> Decorator:
