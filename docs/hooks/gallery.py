@@ -82,6 +82,8 @@ def shortened(words: list[str], longest_s: float) -> list[str]:
         return [*words, "--duration", f"{last + longest_s:g}"]
     if longest_s and words[:2] == ["campaign", "run"]:
         return [*words, "--runs", "2", "--workers", "0"]
+    if longest_s and words[:2] == ["campaign", "report"]:
+        return [*words, "--metric", "attitude.rms"]
     return words
 
 

@@ -28,7 +28,9 @@ SHORTER = {
     r"campaign run .*ets_vii": "--runs 6 --workers 0",  # grids of six and of three
     r"campaign run .*noise": "--runs 2 --workers 0",  # a grid of two
     r"campaign run": "--runs 1 --workers 0",
+    r"campaign report (?!.*--metric)": "--metric attitude.rms",
     r"export": "--acceptance-seconds 0.3",
+    r"gains check(?! .*(--controller|--plant-robot|--robot))": "--controller tde_stc",
     r"fly .*--scenario": "--help",  # a scenario is read before
     r"fly .*(kill|stop)_": "--duration {}",
     r"fly": "--composed --duration 0.2",
