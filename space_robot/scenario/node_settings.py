@@ -259,9 +259,12 @@ def _check_may_be_set(parameters: Mapping[str, Mapping[str, Any]]) -> None:
 def option_parameters(scenario: Scenario) -> dict[str, dict[str, Any]]:
     """Return the parameters that a scenario sets, by node and dotted name."""
 
-    def changed(*options: str) -> Tree:  # the others are as a node's files say
-        values = {option: getattr(scenario, option) for option in options}
-        return {name: value for name, value in values.items() if value != OPTIONS[name].default}
+    def changed(node: str) -> Tree:  # the others are as a node's files say
+        return {
+            name: getattr(scenario, name)
+            for name, option in OPTIONS.items()
+            if option.sets in (node, "all") and getattr(scenario, name) != option.default
+        }
 
     robot, law = robot_setting(scenario.robot), resolve_law(scenario.controller)
     mission, waypoints, start = _mission(scenario.mission)
@@ -276,7 +279,6 @@ def option_parameters(scenario: Scenario) -> dict[str, dict[str, Any]]:
         del files["orbit"]
     parameters: dict[str, Tree] = {
         "plant": {
-            **changed("substeps"),
             **files,
             **start,
             **numbers,
@@ -286,7 +288,6 @@ def option_parameters(scenario: Scenario) -> dict[str, dict[str, Any]]:
             "fifo_priority": scenario.fifo_priority,
             "faults": scenario.faults_of(PLANT_KINDS),
             "fault_seed": scenario.seed,
-            **changed("paused", "events"),
             **({} if scenario.friction else NO_FRICTION),
         },
         "controller": {
@@ -296,13 +297,12 @@ def option_parameters(scenario: Scenario) -> dict[str, dict[str, Any]]:
             **gain_values,
             "fifo_priority": scenario.fifo_priority,
             "swaps": scenario.swaps,
-            **changed("controller_code", "shadow", "navigation"),
         },
         "mission": {"robot": robot, "mission": mission, **waypoints},
-        "recorder": changed("compression", "split_size"),
+        "recorder": {},
     }
     return {
-        node: {**changed("period"), **values, **scenario.parameters.get(node, {})}
+        node: {**values, **changed(node), **scenario.parameters.get(node, {})}
         for node, values in parameters.items()
     }
 

@@ -29,6 +29,8 @@ class Option:
     """Folder of config/ with the files, or folders, that can be named."""
     node: str = ""
     """Node for which alone it is; without meaning where that node is another's."""
+    sets: str = ""
+    """Node, or "all", whose parameter of the same name it is where it differs from the default."""
     needs_graph: bool = False
     """True if the option applies only to a graph of nodes."""
     is_launched: bool = True
@@ -121,24 +123,28 @@ class Options:
     duration: float | None = option(
         "Seconds to fly", None, default_text="the mission's", above=0.0, high=1e6
     )
-    period: float | None = option("Length of a tick of all nodes, s", None, default_text="0.0005")
+    period: float | None = option(
+        "Length of a tick of all nodes, s", None, default_text="0.0005", sets="all"
+    )
     substeps: int | None = option(
-        "Integration steps of the plant in a tick", None, default_text="1"
+        "Integration steps of the plant in a tick", None, default_text="1", sets="plant"
     )
     compression: Literal["none", "lz4", "zstd"] | None = option(
-        "Compression of the bag", None, default_text="lz4"
+        "Compression of the bag", None, default_text="lz4", sets="recorder"
     )
     split_size: str | int | None = option(
         "Continue the bag in another file after this many bytes, as 500K, 100M, 2G",
         None,
         default_text="one file",
         metavar="SIZE",
+        sets="recorder",
     )
     navigation: Literal["direct", "filtered"] | None = option(
         "What the laws see: the measurements, or the navigation filter's estimates",
         None,
         default_text="direct",
         node="controller",
+        sets="controller",
     )
     command_latency_ticks: int = option("Ticks by which the plant applies commands late", 0)
     friction: bool = option("Joint friction of the case, or none", True)
@@ -159,6 +165,7 @@ class Options:
         [],
         default_text="the mission's events",
         metavar="capture@T:TARGET|release@T[:SPEED]",
+        sets="plant",
     )
     seed: int = option("Seed of the random numbers of faults and sensors", 0, low=0)
     controller_code: str = option(
@@ -167,16 +174,21 @@ class Options:
         "python",
         metavar="CODE",
         node="controller",
+        sets="controller",
     )
     shadow: Literal["none", "c"] = option(
         "Let the C code answer, too, and end the flight with exit code 1 at the first number "
         "that differs",
         "none",
         node="controller",
+        sets="controller",
     )
     realtime: bool = option("Pace by the wall clock instead of lockstep", False, needs_graph=True)
     paused: bool = option(
-        "Begin paused: `space-robot sim` resumes the plant, or steps it", False, needs_graph=True
+        "Begin paused: `space-robot sim` resumes the plant, or steps it",
+        False,
+        needs_graph=True,
+        sets="plant",
     )
     fifo_priority: int = option(
         "Ask for SCHED_FIFO for plant and controller; for machines with cores to spare",
