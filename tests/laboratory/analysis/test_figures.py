@@ -387,7 +387,6 @@ def test_of_several_flights_each_has_its_own(paper_robot: Robot, tmp_path: Path)
     drawings = figures.drawings()
     empty = {name for name, drawing in drawings.items() if not drawing.draw().axes}
     assert empty == {"latency", "ripple"}
-    for name, of in (("momentum_1", "wheels"), ("momentum_2", "free")):
-        assert drawings[name].caption.endswith(f"common centre of mass of {of}")
-    assert {"wheels_1", "junctions", "chatter"} <= {*drawings}
-    assert not {"momentum_3", "wheels_3"} & {*drawings}
+    own = [d.caption for name, d in drawings.items() if name.startswith(("momentum_", "wheels_"))]
+    assert [caption.rpartition(" of ")[2] for caption in own] == ["wheels", "wheels", "free"]
+    assert {"junctions", "chatter"} <= {*drawings}
