@@ -32,7 +32,7 @@ REPORTS = 5
 """Maximum number of reports read in a round: each takes a tenth of a millisecond."""
 CHECK_PERIOD_S = 0.02
 """Period of checks for publishers of topics that only some flights have."""
-AHEAD_OF_NEED = (topics.REFERENCE_JOINTS, topics.REFERENCE_BASE)
+EARLY_TOPICS = (topics.REFERENCE_JOINTS, topics.REFERENCE_BASE)
 """Topics sent ahead of need: messages that came during a pause belong to the time after it, too."""
 TIMEOUT_S = 0.002
 """Extra time that messages may wait while other nodes of the process are busy. After ten times as
@@ -178,7 +178,7 @@ class RecorderLoop:
     def _take_some(self, entry: RawSubscription) -> tuple[int, int]:
         """Return the numbers of messages taken, and of those sent before the end."""
         timely = 0  # with those of a pause: behind them in the queue are some to be recorded
-        begin_ns = 0 if entry.topic in AHEAD_OF_NEED else self._from_ns
+        begin_ns = 0 if entry.topic in EARLY_TOPICS else self._from_ns
         until_ns = self._end_ns
         for count in range(TURN):
             if (taken := entry.take_with_info()) is None:

@@ -114,15 +114,15 @@ class PairFilter:
             pairs: (K, ...).
         """
         smoothing, known = self._smoothing, self._stop - first
-        new = pairs[max(known, 0) :]
-        if not (0.0 < smoothing < 1.0 and len(new)):
+        inputs = pairs[max(known, 0) :]
+        if not (0.0 < smoothing < 1.0 and len(inputs)):
             return pairs
         from scipy.signal import lfilter  # slow to import, and hardly ever needed
 
         if self._state is None:
-            before = np.zeros_like(new[:1]) if self._rest else new[:1]
+            before = np.zeros_like(inputs[:1]) if self._rest else inputs[:1]
             self._state = (1.0 - smoothing) * before
-        filtered: Any = lfilter([smoothing], [1.0, smoothing - 1.0], new, axis=0, zi=self._state)
+        filtered: Any = lfilter([smoothing], [1.0, smoothing - 1.0], inputs, axis=0, zi=self._state)
         estimates: Array
         estimates, self._state = filtered
         if known > 0:

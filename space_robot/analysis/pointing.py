@@ -200,16 +200,16 @@ def navigation(flight: AnalysedLog) -> TimeSeries | None:
     return TimeSeries(axes, values, "no telemetry was recorded")
 
 
-OF_POSE = "of the end effector, true less desired"
+POSE_ERROR = "of the end effector, true less desired"
 
 
 @series(
     "end effector",
     {
-        "boresight": Definition("arcsec", f"direction of the z axis {OF_POSE}", ALL),
-        "tool_attitude": Definition("arcsec", f"rotation {OF_POSE}", ALL),
+        "boresight": Definition("arcsec", f"direction of the z axis {POSE_ERROR}", ALL),
+        "tool_attitude": Definition("arcsec", f"rotation {POSE_ERROR}", ALL),
         "tool_position": Definition(
-            "m", f"position {OF_POSE}, the base at its true position in both", ALL
+            "m", f"position {POSE_ERROR}, the base at its true position in both", ALL
         ),
         "base_drift": Definition(
             "m", "of the base's centre of mass from where it began; nothing holds it", ALL

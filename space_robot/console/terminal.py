@@ -27,7 +27,7 @@ from .tables import Column, JudgedCell, Table, Value, cell_text
 
 LONGEST_WORD = 24
 """Characters of a label's word that stay in one line; longer words, such as paths, are folded."""
-COLOUR_OF_TONE = {"good": "green", "bad": "red", "open": "yellow"}
+TONE_COLOURS = {"good": "green", "bad": "red", "open": "yellow"}
 
 
 class _Console(Console):
@@ -134,7 +134,7 @@ def _columns(table: Table) -> list[_Cells]:
 def _cell(value: Value, column: Column) -> str | Text:
     if isinstance(value, JudgedCell):
         text = f"{value.text} " if value.text else ""
-        return Text.assemble(text, (value.word, COLOUR_OF_TONE[value.tone]))
+        return Text.assemble(text, (value.word, TONE_COLOURS[value.tone]))
     return cell_text(value, column)
 
 

@@ -29,7 +29,7 @@ from .plan import Flight
 
 Array = NDArray[np.float64]
 
-STRETCH_TICKS, STRETCH_OF_MESSAGES = 10_000, 1_000
+STRETCH_TICKS, MESSAGE_STRETCH = 10_000, 1_000
 """Ticks flown between two reports of progress: in compiled code, message by message."""
 
 
@@ -80,7 +80,7 @@ def _flown_by_messages(
                 assert messages
                 loop = MessageLoop(flight, messages.record, messages.update_true_state)
                 for tick in range(flight.plant.tick, flight.ticks):
-                    if tick % STRETCH_OF_MESSAGES == 0:
+                    if tick % MESSAGE_STRETCH == 0:
                         progress(tick)
                     messages.begin_tick(tick)
                     messages.show(tick, lambda _: flight.plant.truth)

@@ -55,7 +55,7 @@ COMPARISONS: dict[str, tuple[str, Callable[[Mapping[str, BaseTorque]], Figure]]]
     "junctions": ("Base torque at the junction of the two motions, case 1", drawn.junctions),
 }
 """Caption and drawing function of the figures of all laws, by file name."""
-FIGURE_OF_CASE = {"1": "6", "2": "7", "3": "8", "4-1": "9a", "4-2": "9b"}
+CASE_FIGURES = {"1": "6", "2": "7", "3": "8", "4-1": "9a", "4-2": "9b"}
 TDE_LAWS = ("tde_smc", "tde_tsmc", "tde_stc")
 SMOOTHER = "TDE-STC is smoother, printed gains, ideal sensors: base torque's total variation, "
 SMOOTHNESS = {
@@ -336,7 +336,7 @@ def _figure_groups(rows: Sequence[TableRow], folder: FigureFolder) -> dict[str, 
             *((stem, caption) for stem, (caption, _) in COMPARISONS.items()),
         ]
     }
-    for case, number in FIGURE_OF_CASE.items():
+    for case, number in CASE_FIGURES.items():
         groups[f"Case {case}"] = [
             (row.stem, f"Figure {number}: {row.controller}, {row.shown.title}")
             for row in rows

@@ -23,7 +23,7 @@ from space_robot_control.navigation.settings import assumed_numbers
 from space_robot_model.orbit.ephemeris import AssumedOrbit, AssumedTarget
 from space_robot_model.robot import Robot
 from space_robot_model.robot.find import robot_source
-from space_robot_model.robot.mission_document import OF_PLANT, document_settings
+from space_robot_model.robot.mission_document import PLANT_KEYS, document_settings
 from space_robot_msgs_py.bag.recorder import RecorderNodeSettings
 from space_robot_msgs_py.config.files import GIVEN, Tree, flatten, merge, nest
 from space_robot_msgs_py.config.settings import NodeSettings
@@ -286,7 +286,7 @@ def option_parameters(scenario: Scenario) -> dict[str, dict[str, Any]]:
             "realtime": scenario.realtime,
             "command_latency_ticks": scenario.command_latency_ticks,
             "fifo_priority": scenario.fifo_priority,
-            "faults": scenario.faults_of(PLANT_KINDS),
+            "faults": scenario.fault_texts(PLANT_KINDS),
             "fault_seed": scenario.seed,
             **({} if scenario.friction else NO_FRICTION),
         },
@@ -319,14 +319,14 @@ def _mission(mission: str | Tree) -> tuple[str, Tree, Tree]:
         return mission, {}, {}
     if "start" in mission:
         mission = document_settings(mission, "mission")
-    waypoints = {key: value for key, value in mission.items() if key not in OF_PLANT}
+    waypoints = {key: value for key, value in mission.items() if key not in PLANT_KEYS}
     settings = validate(MissionSettings, waypoints, "mission")
     start: Tree = {"initial_joints_deg": settings.joints_deg}
     if not settings.base_point.strip():
         start["initial_quaternion"] = settings.base_quaternion
     if any(settings.base_rate_deg_s):
         start["initial_rate_deg_s"] = settings.base_rate_deg_s
-    return GIVEN, waypoints, start | {key: mission[key] for key in OF_PLANT if key in mission}
+    return GIVEN, waypoints, start | {key: mission[key] for key in PLANT_KEYS if key in mission}
 
 
 def _gains(gains: str | Tree, law: str | AnyLaw | None) -> tuple[str, Tree]:

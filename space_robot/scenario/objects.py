@@ -23,7 +23,7 @@ from space_robot_model.hardware.base_actuators import BaseActuatorSettings
 from space_robot_model.hardware.sensors import SensorSettings
 from space_robot_model.robot import Robot
 from space_robot_model.robot.find import ROBOTS, robot_as_path
-from space_robot_model.robot.mission_document import OF_PLANT, document_settings
+from space_robot_model.robot.mission_document import PLANT_KEYS, document_settings
 from space_robot_msgs_py.config.arguments import as_positive
 from space_robot_msgs_py.config.files import GIVEN, Tree, flatten, is_named, nest
 from space_robot_msgs_py.config.validation import (
@@ -79,7 +79,7 @@ def _mission(value: Any) -> str | Tree:
     if isinstance(value, Mapping) and "start" in (tree := nest(_plain(value))):
         document_settings(tree, "mission")
         return tree
-    return _settings(MissionSettings, value, OF_PLANT)
+    return _settings(MissionSettings, value, PLANT_KEYS)
 
 
 def _robot(value: Any) -> str | Robot | Tree:

@@ -35,7 +35,7 @@ def resolve(scenario: Scenario) -> ResolvedScenario:
     Single parameters of nodes override the other options.
     """
     with explained_by("disturbances"):
-        faults = parse_faults(scenario.faults_of(PROCESS_KINDS), KINDS)
+        faults = parse_faults(scenario.fault_texts(PROCESS_KINDS), KINDS)
     _check_nodes(scenario, faults)
     if "controller" in scenario.without:
         scenario = scenario.model_copy(update={"controller": None})

@@ -120,9 +120,9 @@ class ResolvedScenario(FlightSettings):
     def faults(self) -> list[str]:
         """The texts of all faults."""
         in_plant = [text for text in self.plant.faults if text.strip()]
-        if in_plant == self.options.faults_of(PLANT_KINDS):
+        if in_plant == self.options.fault_texts(PLANT_KINDS):
             return self.options.faults
-        return [*in_plant, *self.options.faults_of(PROCESS_KINDS)]
+        return [*in_plant, *self.options.fault_texts(PROCESS_KINDS)]
 
     @property
     def swap_texts(self) -> list[str]:

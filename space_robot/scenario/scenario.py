@@ -76,7 +76,7 @@ class Scenario(StrictModel, Options):
         ]
 
     @explained_by("disturbances")
-    def faults_of(self, kinds: Kinds) -> list[str]:
+    def fault_texts(self, kinds: Kinds) -> list[str]:
         """Return the texts of the faults of the given ``kinds``."""
         from space_robot_sim.faults.grammar import parse_faults
 

@@ -186,7 +186,7 @@ def _motion(
     """
     model, base = flexible_model(robot, positions), len(jacobian) - robot.n
     rows = np.arange(3 if base else 6, len(model.inertia))
-    force, rate = _axes_of(robot, len(model.inertia), base)
+    force, rate = _axis_maps(robot, len(model.inertia), base)
     step, by_force = _discrete(_reduced(model, rows), force[rows] @ jacobian.T, period)
     return SmallMotion(step, by_force, jacobian @ rate[:, rows], posture)
 
@@ -225,7 +225,7 @@ def _reduced(model: FlexibleModel, rows: NDArray[np.intp]) -> FlexibleModel:
     return FlexibleModel(inertia, model.stiffness[square], model.damping[square])
 
 
-def _axes_of(robot: Robot, size: int, base: int) -> tuple[Array, Array]:
+def _axis_maps(robot: Robot, size: int, base: int) -> tuple[Array, Array]:
     """Return forces (size, m) by those of the axes, and rates (m, size) as encoders see them."""
     force, rate = np.zeros((size, base + robot.n)), np.zeros((base + robot.n, size))
     for axis in range(base):

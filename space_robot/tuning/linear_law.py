@@ -70,12 +70,12 @@ def linear_law(law: ControlLaw, posture: Posture, inertia_scale: float = 1.0) ->
         law: with its gains and period; it is not changed.
         posture: of the nominal robot.
         inertia_scale: factor on the inertia that a law without ``uses_model`` assumes of the robot:
-            on `law_trial.OF_INERTIA`, or on H_S of its estimate.
+            on `INERTIA_GAINS`, or on H_S of its estimate.
     """
     trial = LawTrial(law, posture, inertia_scale)
     axes = posture.axes
-    columns = {name: trial.columns_of(name, axes) for name in INPUTS}
-    by_state = trial.columns_of_memory()
+    columns = {name: trial.input_columns(name, axes) for name in INPUTS}
+    by_state = trial.memory_columns()
     step, force_by_state = by_state[axes:], by_state[:axes]
     by_input = np.hstack([column[axes:] for column in columns.values()])
     kept = _influential(step, by_input, force_by_state)
@@ -135,7 +135,7 @@ INPUTS = ("error", "error_rate", "rho", "rho_rate", "applied_force", "n_hat")
 """The signals that a law is differentiated by."""
 SWITCHING = ("k_1", "k_2", "gamma")
 """Gains of terms that are not linear; so is ``g`` without a boundary layer ``delta``."""
-OF_INERTIA = ("h_bar", "inertia")
+INERTIA_GAINS = ("h_bar", "inertia")
 """Gains that are the inertia which a law assumes of each axis."""
 UPRIGHT = np.array([1.0, 0.0, 0.0, 0.0])
 STEP = 2.0**-33
@@ -148,13 +148,13 @@ class LawTrial:
 
     def __init__(self, law: ControlLaw, posture: Posture, inertia_scale: float = 1.0) -> None:
         """Run the law for one tick at rest."""
-        self._law, self._posture = _copy_of(law), posture
+        self._law, self._posture = _copied_law(law), posture
         gains = self._law.gain_values
         switching = SWITCHING if "delta" in gains else (*SWITCHING, "g")
         for name, values in gains.items():
             if name in switching:
                 values[:] = 0.0
-            elif name in OF_INERTIA:
+            elif name in INERTIA_GAINS:
                 values *= inertia_scale
         self._block = self._at_rest(1.0 if law.uses_model else inertia_scale)
         self._bytes = self._block.view(np.uint8)
@@ -183,7 +183,7 @@ class LawTrial:
         assign(signals, base_is_free=posture.axes == posture.robot.n)
         return block
 
-    def columns_of(self, name: str, axes: int) -> Array:
+    def input_columns(self, name: str, axes: int) -> Array:
         """Return changes of force and memory by a signal, one column for each axis."""
         columns = []
         for unit in np.eye(axes):
@@ -198,7 +198,7 @@ class LawTrial:
             columns.append(_slope(*ticks))
         return np.stack(columns, axis=1)
 
-    def columns_of_memory(self) -> Array:
+    def memory_columns(self) -> Array:
         """Return changes of force and memory by each number of the memory.
 
         Those of fields through which no force changes are zero.
@@ -267,7 +267,7 @@ class LawTrial:
             signals.omega_base[:] = signals.rho_rate[:3] / J0
 
 
-def _copy_of(law: ControlLaw) -> ControlLaw:
+def _copied_law(law: ControlLaw) -> ControlLaw:
     """Return a copy of a law.
 
     Raises:

@@ -73,12 +73,12 @@ class TrajectoryTable:
             if rate is not None:
                 _check_rates(name, np.array(rate), self._joints.rates[:, joint], time)
         self._attitude: CubicSpline | None = None
-        columns_of_base = [name for name in QUATERNION if name in columns]
-        if columns_of_base and len(columns_of_base) < 4:
+        base_columns = [name for name in QUATERNION if name in columns]
+        if base_columns and len(base_columns) < 4:
             raise InputError(
-                f"trajectory: {', '.join(columns_of_base)} without the rest of a quaternion"
+                f"trajectory: {', '.join(base_columns)} without the rest of a quaternion"
             )
-        if columns_of_base:
+        if base_columns:
             self._attitude = CubicSpline(self._time, _quaternions(columns))
 
     @property

@@ -144,7 +144,7 @@ class MissionDocument(StrictModel):
         return parameters | {"base_quaternion": base, "initial_quaternion": base}
 
 
-OF_PLANT = ("initial_joints_deg", "initial_quaternion", "initial_rate_deg_s", "events")
+PLANT_KEYS = ("initial_joints_deg", "initial_quaternion", "initial_rate_deg_s", "events")
 """Settings of a mission for the plant: its initial state, captures and releases."""
 
 
@@ -165,7 +165,7 @@ def mission_layer(path: Path, node: str, robot: str) -> Tree:
         raise InputError(f"{path}: {next(iter(content))}: a mission stands below the key {KEY!r}")
     else:
         return node_parameters(path, node)
-    return {key: v for key, v in settings.items() if (key in OF_PLANT) is (node == PLANT)}
+    return {key: v for key, v in settings.items() if (key in PLANT_KEYS) is (node == PLANT)}
 
 
 def document_settings(content: Mapping[str, Any], where: str) -> Tree:

@@ -206,7 +206,7 @@ def test_it_flies_message_by_message(plan: Planned, flown: Get, tmp_path: Path) 
     """As if messages could fail: the loop of the nodes, without ROS."""
     faults = [*plan.options.get("faults", []), "drop_state@0:0"]
     expected, flight = flown(plan), plan.scenario.replace(faults=faults).fly(tmp_path / "bag")
-    if expected.log.measured is None:  # where nothing can be wrong they are not told apart
+    if expected.log.measured is None:  # they are recorded only where they differ
         flight.log.measured = flight.log.assumed_error = None
     assert difference(flight.log, expected.log, OF_THE_PROCESS) == ""
     assert (flight.log.laws, flight.log.filled) == (expected.log.laws, 0)

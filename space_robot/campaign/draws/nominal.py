@@ -166,7 +166,7 @@ class Nominal:
         options = nominal.options.model_copy(
             update={"seed": variation.seed, "faults": variation.faults}
         )
-        plant_changes["faults"] = options.faults_of(PLANT_KINDS) or [""]
+        plant_changes["faults"] = options.fault_texts(PLANT_KINDS) or [""]
         try:
             plant = _plant(nominal.plant, {**plant_changes, "fault_seed": variation.seed})
             laws = _laws(nominal, gains)
@@ -183,7 +183,7 @@ class Nominal:
             robots=robots.with_plant(variation.plant_robot) if variation.plant_robot else robots,
             laws=laws,
             swaps=[(tick, laws[law.name]) for tick, law in nominal.swaps],
-            process_faults=parse_faults(options.faults_of(PROCESS_KINDS), KINDS),
+            process_faults=parse_faults(options.fault_texts(PROCESS_KINDS), KINDS),
         )
 
 

@@ -24,7 +24,7 @@ from .robot_numbers import LOG_FACTORS, ROTATIONS, is_always_consistent, least_f
 
 FAULTS = "faults"
 MISSION_START = ("mission", "start_deg")
-EACH_OF_FAULT = ":[*]"
+EACH_AXIS = ":[*]"
 """End of a fault's text: one variable for each axis, wheel or thruster."""
 _TIME = re.compile(r"(?<=@)T(?=$|:)")
 
@@ -161,13 +161,13 @@ def _faults(key: str, distribution: Distribution, names: RobotNames) -> Iterator
         raise InputError("a fault has no nominal value: relative and offset need one")
     if not distribution.is_number:
         raise InputError("numbers were expected")
-    head, each, _ = key.partition(EACH_OF_FAULT)
+    head, each, _ = key.partition(EACH_AXIS)
     elements = [key]
     if each:
         about = kind.argument.about if kind.argument else None
-        if not about or not key.endswith(EACH_OF_FAULT):
+        if not about or not key.endswith(EACH_AXIS):
             raise InputError(
-                f"{EACH_OF_FAULT} is allowed only at the end of a fault of axes or actuators"
+                f"{EACH_AXIS} is allowed only at the end of a fault of axes or actuators"
             )
         elements = [f"{head}:{name}" for name in _names(about, names)]
     for text in elements:

@@ -30,7 +30,7 @@ _TABLES = (
     "ended_at_s REAL, vary TEXT, metrics TEXT, require TEXT, band_lengths TEXT, bands BLOB, "
     "digest TEXT, PRIMARY KEY (run, law))",
 )
-NOT_OF_THE_FILE = (
+TRANSIENT_ERRORS = (
     "database is locked",
     "unable to open database file",
     "database or disk is full",
@@ -120,7 +120,7 @@ class CampaignStore:
         try:
             yield
         except sqlite3.Error as error:
-            if str(error).startswith(NOT_OF_THE_FILE):
+            if str(error).startswith(TRANSIENT_ERRORS):
                 text = f"{error}; the same command flies the missing flights"
             else:
                 text = f"damaged: {error}; fly the campaign into another folder"

@@ -236,7 +236,7 @@ def test_the_bag_has_every_message_once_and_in_order(tmp_path: Path) -> None:
 def test_what_was_flown_here_is_trusted_and_its_progress_is_told(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    monkeypatch.setattr("space_robot.flight.simulate.STRETCH_OF_MESSAGES", 75)
+    monkeypatch.setattr("space_robot.flight.simulate.MESSAGE_STRETCH", 75)
     for bag in (None, tmp_path / "bag"):
         ticks: list[int] = []
         flight = planned(faults=[NOTHING], duration=TICKS * 5e-4)

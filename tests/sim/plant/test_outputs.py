@@ -28,7 +28,7 @@ from space_robot_sim.plant import outputs
 from space_robot_sim.plant.outputs import BaseOutput
 
 Array = NDArray[np.float64]
-PERIOD, LOOK_S = 5e-4, 0.02
+PERIOD, CHECK_EVERY_S = 5e-4, 0.02
 
 
 class Node:
@@ -202,7 +202,7 @@ class Output:
 
 def times(late: LateListeners, start: float, stop: float) -> list[float]:
     """When a paused plant repeats its messages, between two times."""
-    return [float(now) for now in np.arange(start, stop, LOOK_S) if late.are_due(float(now))]
+    return [float(now) for now in np.arange(start, stop, CHECK_EVERY_S) if late.are_due(float(now))]
 
 
 @pytest.mark.parametrize("which", [0, 1])
@@ -215,7 +215,7 @@ def test_messages_are_repeated_for_those_who_join_and_for_nobody_else(which: int
     outputs[1 - which].listener_count -= 1
     repeated = times(late, 3.0, 10.0)
     assert repeated[0] == 3.0, "at once, though another has left"
-    assert np.diff(repeated) == pytest.approx(REPEAT_EVERY_S, abs=LOOK_S)
+    assert np.diff(repeated) == pytest.approx(REPEAT_EVERY_S, abs=CHECK_EVERY_S)
     assert repeated[-1] < 3.0 + REPEAT_FOR_S
     assert len(repeated) == round(REPEAT_FOR_S / REPEAT_EVERY_S)
     outputs[which].listener_count -= 1
