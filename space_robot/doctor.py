@@ -110,7 +110,7 @@ def check_python(python: tuple[int, int] = sys.version_info[:2]) -> CheckedItem:
 def check_packages(required: Mapping[str, list[str]]) -> Iterator[CheckedItem]:
     """Check the packages required by each extra, and without one (key "")."""
     packages = required.get("", [])
-    versions, lacking = _installed(packages)
+    versions, lacking, lack = _installed(packages)
     if not packages:
         text = "space_robot is not installed; it runs from its folder"
         advice = "pip install -e . in the folder of space_robot, so that versions can be checked"
@@ -118,28 +118,26 @@ def check_packages(required: Mapping[str, list[str]]) -> Iterator[CheckedItem]:
     else:
         shown = ("numpy", "numba", "scipy", "pydantic", "matplotlib", "mcap")
         text = ", ".join(f"{name} {versions[name]}" for name in shown if name in versions)
-        text = f"not installed: {', '.join(lacking)}" if lacking else text
         advice = install_packages(lacking) if lacking else ""
-        yield judged("packages", text, advice, versions, "missing")
+        yield judged("packages", lack or text, advice, versions, "missing")
     for extra, use in USES.items():
         name, packages = f"extra {extra}", required.get(extra, [])
-        versions, lacking = _installed(packages)
+        versions, lacking, lack = _installed(packages)
         if not packages:
             text = f"{use}: unknown, the installed space_robot does not list this extra"
             yield CheckedItem(name, "warning", text, "install space_robot again")
             continue
-        text = ", ".join(f"{package} {number}" for package, number in versions.items())
-        text = f"not installed: {', '.join(lacking)}" if lacking else text
+        text = lack or ", ".join(f"{package} {number}" for package, number in versions.items())
         advice = f"{install_packages(lacking)}, if you need it" if lacking else ""
         yield judged(name, f"{use}: {text}", advice, versions, "missing")
 
 
-def _installed(packages: Sequence[str]) -> tuple[dict[str, str | None], list[str]]:
-    """Return the version of each required package by name, and the requirements not installed."""
+def _installed(packages: Sequence[str]) -> tuple[dict[str, str | None], list[str], str]:
+    """Return the version of each package, the requirements not installed, and a text of these."""
     names = [re.split(r"[^\w.-]", requirement, maxsplit=1)[0] for requirement in packages]
     versions = {name: installed_version(name) for name in names}
     lacking = [text for text, name in zip(packages, names, strict=True) if not versions[name]]
-    return versions, lacking
+    return versions, lacking, f"not installed: {', '.join(lacking)}" if lacking else ""
 
 
 def check_flights() -> CheckedItem:
@@ -380,16 +378,11 @@ def _check_compilers(search_path: str | None) -> CheckedItem:
 def _first_line(path: str) -> str:
     """Return the first line of a compiler's ``--version``."""
     try:
-        lines = subprocess.check_output(
-            [path, "--version"],
-            stdin=subprocess.DEVNULL,
-            text=True,
-            errors="replace",
-            timeout=COMPILER_TIMEOUT_S,
-        )
+        command, nothing = [path, "--version"], subprocess.DEVNULL
+        output = subprocess.check_output(command, stdin=nothing, timeout=COMPILER_TIMEOUT_S)
     except (OSError, subprocess.SubprocessError) as error:
         return f"does not run ({error})"
-    return next(iter(lines.splitlines()), "")
+    return next(iter(output.decode(errors="replace").splitlines()), "")
 
 
 def can_fly(items: Iterable[CheckedItem]) -> bool:
