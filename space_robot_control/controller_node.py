@@ -10,11 +10,11 @@ from space_robot_msgs_py.ros.node_host import run_nodes
 
 from .controller.loop import ControllerLoop
 from .controller.settings import ControllerNodeSettings
-from .flight_code.supervisors import supervisor_of
+from .flight_code.supervisors import make_supervisor
 
 NODE = NodeKind(
     ControllerNodeSettings,
-    partial(ControllerLoop, supervisor_of=supervisor_of),
+    partial(ControllerLoop, make_supervisor=make_supervisor),
     changeable=("controller",),
 )
 

@@ -10,7 +10,7 @@ from typing import Any
 from space_robot_control.controller.controller import Controller
 from space_robot_control.controller.law_choice import NoLaw
 from space_robot_control.controller.supervisor import Supervisor
-from space_robot_control.flight_code.supervisors import supervisor_of
+from space_robot_control.flight_code.supervisors import make_supervisor
 from space_robot_control.laws import ControlLaw
 from space_robot_msgs_py.errors import InputError
 from space_robot_sim.plant.plant import Plant
@@ -80,7 +80,7 @@ class Flight:
 
         The flight code in C is compiled, or the flight computer greeted, at the first request.
         """
-        return supervisor_of(self.controller, self.laws.values(), self.controller_settings)
+        return make_supervisor(self.controller, self.laws.values(), self.controller_settings)
 
     def check_in_process(self) -> None:
         """Check that the flight can run in one process: no option needs a graph of nodes."""

@@ -132,7 +132,7 @@ def build_law(
             copied.gain_values = check_gains(values, type(law), axes, PARAMETERS)
         return copied
     may_lack = settings.gains == DEFAULT and (bool(overrides) or not law.required_gains())
-    files = _files_of(settings, may_lack)
+    files = _law_files(settings, may_lack)
     if law.name in files:
         gains = read_gains(files[law.name], law, axes)
     elif may_lack:
@@ -176,7 +176,7 @@ class Laws(Mapping[str, ControlLaw]):
         self._built = {first.name: self._build(first)}
         brings_gains = isinstance(first, ControlLaw) or not first.required_gains()
         may_lack = settings.gains == DEFAULT and (brings_gains or first.name in self._overrides)
-        self._files = _files_of(settings, may_lack)
+        self._files = _law_files(settings, may_lack)
         for name in self._overrides:
             _ = self[one_of(name, self, "law", f" in {PARAMETERS} (gains are <law>.<gain>)")]
 
@@ -200,7 +200,7 @@ class Laws(Mapping[str, ControlLaw]):
         return sum(1 for _ in self)
 
 
-def _files_of(settings: ControllerNodeSettings, may_lack: bool) -> dict[str, Path]:
+def _law_files(settings: ControllerNodeSettings, may_lack: bool) -> dict[str, Path]:
     try:
         return gain_files(settings.robot, settings.gains)
     except InputError:

@@ -50,13 +50,13 @@ class ControllerLoop:
         self,
         node: ManagedNode[ControllerNodeSettings],
         settings: ControllerNodeSettings,
-        supervisor_of: SupervisorOf = lambda controller, _, settings: Supervisor(
+        make_supervisor: SupervisorOf = lambda controller, _, settings: Supervisor(
             controller, settings.hold_ticks, settings.longest_jump
         ),
     ) -> None:
         """Make laws, controller and topics.
 
-        ``supervisor_of`` makes the supervisor from the controller, its laws and the settings.
+        ``make_supervisor`` makes the supervisor from the controller, its laws and the settings.
         """
         self._node, self._settings = node, settings
         robot = find_robot(settings.robot)
@@ -75,7 +75,7 @@ class ControllerLoop:
             node, robot, timebase, settings.reference_timeout, settings.join_timeout
         )
         self._answering = StateResponder(
-            supervisor_of(self._controller, self._laws.laws, settings),
+            make_supervisor(self._controller, self._laws.laws, settings),
             self._laws.choice,
             self._references.buffer,
             settings,

@@ -14,7 +14,7 @@ from space_robot_msgs_py.compiled.records import Field as RecordField
 from space_robot_msgs_py.compiled.records import Record
 
 from .c99 import language as lang
-from .c99.program import CALL, CONSTANT, FIELD, Constant, Function, KernelProgram, syntax_of
+from .c99.program import CALL, CONSTANT, FIELD, Constant, Function, KernelProgram, parse_body
 
 WIDTH = 100
 """Longest line."""
@@ -217,7 +217,7 @@ class Files:
         return texts
 
     def _definition(self, function: Function) -> str:
-        tree, file = syntax_of(function.body)
+        tree, file = parse_body(function.body)
         about = ast.get_docstring(tree) or tree.name
         line = function.body.__code__.co_firstlineno
         text = comment(f"{about}\n\nPython: {tree.name}, {file}, line {line}.")

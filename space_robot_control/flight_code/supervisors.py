@@ -114,7 +114,7 @@ def bits(numbers: Array) -> NDArray[np.int64]:
     return copied.view(np.int64)
 
 
-def supervisor_of(
+def make_supervisor(
     controller: Controller, laws: Iterable[ControlLaw], settings: ControllerNodeSettings
 ) -> Supervisor:
     """Return the supervisor that the settings ask for.

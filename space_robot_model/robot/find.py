@@ -107,7 +107,7 @@ def robot_files(robot: str) -> RobotFiles:
         check_readable(path)
         return _in_own_folder(path) if path.stem == ROBOT_STEM else _in_config(path)
     if "/" in robot:
-        return _in_own_folder(_file_of(path))
+        return _in_own_folder(_folder_file(path))
     if not is_named(ROBOTS, robot):
         raise InputError(
             f"unknown robot {short(robot)}: "
@@ -225,7 +225,7 @@ def _robot_files(name: str, file: Path, mission: Path, gains: Path) -> RobotFile
     return RobotFiles(name, file, mission if has_mission else None, gains if has_gains else None)
 
 
-def _file_of(folder: Path) -> Path:
+def _folder_file(folder: Path) -> Path:
     endings = (*YAML, *URDF)
     if os.path.lexists(folder) and not is_folder(folder):
         raise InputError(

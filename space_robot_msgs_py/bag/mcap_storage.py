@@ -75,7 +75,7 @@ class McapStorage:
             self.damage = []
             if self.has_end:
                 self._read_summary(file)
-        self._damage_of_index = self.damage
+        self._index_damage = self.damage
 
     def topics(self) -> dict[str, str]:
         """Return the type (empty: not known) by topic, of all channels met so far."""
@@ -87,7 +87,7 @@ class McapStorage:
         Raises:
             OSError: the file can no longer be read.
         """
-        self.damage, self.incomplete = [*self._damage_of_index], False
+        self.damage, self.incomplete = [*self._index_damage], False
         pieces: list[bytes] = []
         length = 0
         with self.path.open("rb") as file:

@@ -35,7 +35,7 @@ class PolledCallbackGroup(CallbackGroup):
         return False
 
 
-def full_name_of(info: TopicEndpointInfo) -> str:
+def full_node_name(info: TopicEndpointInfo) -> str:
     """Return the full name of an endpoint's node."""
     return f"{info.node_namespace.rstrip('/')}/{info.node_name}"
 
@@ -94,7 +94,7 @@ class RawPublisher:
         awaited = [entry.partition(":") for entry in names if entry]
         nodes = [node for node, _, topic in awaited if topic.strip("/") in ("", self.topic.name)]
         infos = self._node.get_subscriptions_info_by_topic(self.topic.name)
-        listening = {full_name_of(info) for info in infos}
+        listening = {full_node_name(info) for info in infos}
         here = self._node.get_namespace().rstrip("/")
         missing = [
             name

@@ -141,7 +141,7 @@ class MessageDescription:
         names = getattr(message, "name", getattr(message, "joint_names", None))
         order = [] if names is None else name_order(names, self.names, self.topic.full_name)
         if not self._is_trajectory:
-            yield from self._runs_of_part(message, order, "")
+            yield from self._part_runs(message, order, "")
             return
         if not message.points:
             raise MessageError(f"{self.topic.full_name}: a trajectory without points")
@@ -151,9 +151,9 @@ class MessageDescription:
                 raise MessageError(
                     f"{self.topic.full_name}: point {i} is not {i} ticks after its message's stamp"
                 )
-            yield from self._runs_of_part(point, order, f"points[{i}].")
+            yield from self._part_runs(point, order, f"points[{i}].")
 
-    def _runs_of_part(self, part: Any, order: list[int], prefix: str) -> Iterator[Run]:
+    def _part_runs(self, part: Any, order: list[int], prefix: str) -> Iterator[Run]:
         for path, columns in self.fields.items():
             values, _, is_of_body = path.partition("[")
             count = len(getattr(part, values)) if path in ROWS or is_of_body else 1

@@ -212,9 +212,9 @@ class ControllerWatch:
             )
 
     def _publishers(self) -> str:
-        from space_robot_msgs_py.ros.endpoints import full_name_of
+        from space_robot_msgs_py.ros.endpoints import full_node_name
 
         infos = self._node.get_publishers_info_by_topic(self._topic)
-        names = ", ".join(sorted(map(full_name_of, infos))) or "none"
+        names = ", ".join(sorted(map(full_node_name, infos))) or "none"
         domain = self._node.context.get_domain_id()
         return f"publishers of {self._topic} in ROS domain {domain}: {names}"

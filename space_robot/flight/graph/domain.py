@@ -151,7 +151,7 @@ def refuse_publishers(
     ``joined_at``: when ``node`` was made, by the monotonic clock; ``names``: of the flight's nodes;
     ``foreign``: topics that the user's nodes publish.
     """
-    from space_robot_msgs_py.ros.endpoints import full_name_of
+    from space_robot_msgs_py.ros.endpoints import full_node_name
 
     namespace = node.get_namespace().rstrip("/")
     # discovery shows a node, also one of ours, without its name for a moment
@@ -163,7 +163,7 @@ def refuse_publishers(
         is_discovered = time.monotonic() >= joined_at + DISCOVERY_S
         for topic in (topic for topic in topics.RECORDED if topic not in foreign):
             infos = node.get_publishers_info_by_topic(topic.name)
-            if others := sorted({full_name_of(info) for info in infos} - own):
+            if others := sorted({full_node_name(info) for info in infos} - own):
                 raise InputError(
                     f"{node.resolve_topic_name(topic.name)} is also published by "
                     f"{', '.join(others)}: end that, or take another domain with --domain, or "

@@ -86,13 +86,13 @@ class OwnNodes:
 
     def arrived(self) -> str:
         """Describe nodes that have come since the last call; empty if there are none."""
-        from space_robot_msgs_py.ros.endpoints import full_name_of
+        from space_robot_msgs_py.ros.endpoints import full_node_name
 
         come = []
         for node in list(self._missing):
             infos = [self._node.get_publishers_info_by_topic(t.name) for t in AWAITED[node]]
             if all(infos):
-                names = sorted({full_name_of(info) for each in infos for info in each})
+                names = sorted({full_node_name(info) for each in infos for info in each})
                 come.append(f"your {node} is {', '.join(names)}")
                 self._missing.remove(node)
         return "; ".join(come)

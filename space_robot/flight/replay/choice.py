@@ -10,7 +10,7 @@ from space_robot_control.controller.gains import check_gains
 from space_robot_control.controller.law_choice import LawChoice, NoLaw, parse_swaps
 from space_robot_control.controller.settings import DEFAULT, ControllerNodeSettings, gains_as_path
 from space_robot_control.controller.supervisor import Supervisor
-from space_robot_control.flight_code.supervisors import supervisor_of
+from space_robot_control.flight_code.supervisors import make_supervisor
 from space_robot_control.laws import ControlLaw, find_law, laws
 from space_robot_control.laws.names import require_shipped_law
 from space_robot_model.robot import Robot
@@ -115,7 +115,7 @@ class ControllerChoice:
         first = next(iter(laws.values()))
         controller = Controller.from_settings(self.robot, first, self.settings, self._hardware)
         choice = LawChoice(first, [(tick, laws[name]) for tick, name in self._swaps])
-        return supervisor_of(controller, laws.values(), self.settings), choice, laws
+        return make_supervisor(controller, laws.values(), self.settings), choice, laws
 
     def set_gains(self, law: ControlLaw, flown: LawInForce) -> None:
         """Give a law the gains of the flight; those that the user gave stay."""

@@ -62,7 +62,7 @@ class Function:
 
 
 @cache
-def syntax_of(body: Callable[..., Any]) -> tuple[ast.FunctionDef, str]:
+def parse_body(body: Callable[..., Any]) -> tuple[ast.FunctionDef, str]:
     """Return the syntax tree of a function, and its file from the package's folder on."""
     tree = ast.parse(textwrap.dedent(inspect.getsource(body))).body[0]
     path = Path(inspect.getsourcefile(body) or "?")
@@ -81,7 +81,7 @@ def translated(
     types: dict[str, lang.Type] = {}
     result: lang.Type = None
     for _ in range(MOST_PASSES):  # an integer may turn out to be a float at the end of a loop
-        translation = Statements(program, body, *syntax_of(body), kinds)
+        translation = Statements(program, body, *parse_body(body), kinds)
         translation.types |= types
         translation.result = result
         translation.body()
@@ -297,7 +297,7 @@ class KernelProgram:
 
         Translations that differ only in the lengths of arrays that they do not read are one.
         """
-        tree, file = syntax_of(body)
+        tree, file = parse_body(body)
         if len(tree.args.args) != len(arguments):
             raise RefusedError(f"a call of {tree.name}() without all arguments", "give them all")
         # a truth value that is known is bound
