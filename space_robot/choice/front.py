@@ -1,14 +1,15 @@
 """The front of a law: its least error for each ripple, over all its gains.
 
-After a first design (the tuned gains, and gain sets around them and over the whole space) the
-search goes on in batches. Each proposal has the least error with a ripple of at most a share of the
-one that the user allows (`SHARES_OF_RIPPLE`), or the least ripple with an error, by what the
-`surrogate` predicts, each of its processes a random number of standard deviations off its mean (as
-in Berk et al., Randomised Gaussian process upper confidence bound for Bayesian optimisation,
-arXiv:2006.04296). Candidates are in a region around the best gain set known for that ripple, which
-shrinks as the search goes on, and such as have some coordinates of it and some of another gain set,
-since base and joints are nearly independent. Every gain set that was tried is kept: the front is
-those which no other beats in both.
+After a first design (the start with several bandwidths and low-passes, gain sets around the best of
+these and over the whole space) the search goes on in batches. Gain sets under which small motions
+grow in some posture of the mission are not flown, and do not count. Each proposal has the least
+error with a ripple of at most a share of the one that the user allows (`SHARES_OF_RIPPLE`), or the
+least ripple with an error, by what the `surrogate` predicts, each of its processes a random number
+of standard deviations off its mean (as in Berk et al., Randomised Gaussian process upper confidence
+bound for Bayesian optimisation, arXiv:2006.04296). Candidates are in a region around the best gain
+set known for that ripple, which shrinks as the search goes on, and such as have some coordinates of
+it and some of another gain set, since base and joints are nearly independent. Every gain set that
+was tried is kept: the front is those which no other beats in both.
 """
 
 from __future__ import annotations
@@ -34,11 +35,13 @@ BATCH = 8
 FIRST_DESIGN = 0.2
 """Share of the gain sets that is not proposed by the surrogates."""
 FIRST_SPREAD = 0.2
-"""Standard deviation of the first design around the tuned gains; a third of it is over all."""
+"""Standard deviation of the first design around the best of the start; a third is over all."""
 LONGEST, SHORTEST = 0.4, 0.05
 """Half the side of the first and of the last region; 1: the whole range of a coordinate."""
 LAST_PART = 0.6
 """Share of the batches after which only the ripple allowed counts."""
+MOST_UNSTABLE = 3
+"""Most gain sets tried, with those that are not flown, relative to the number to fly."""
 CANDIDATES, ROUNDS = 400, 4
 """Points from which a proposal is chosen, and rounds, each in half the region of the last."""
 
@@ -66,7 +69,7 @@ class Front:
 
     law: str
     tried: list[Tried]
-    """All gain sets, in the order in which they were tried; the first one is the tuned one."""
+    """All gain sets, in the order in which they were tried; the first one is the start."""
 
     @property
     def best(self) -> list[Tried]:
@@ -92,7 +95,17 @@ class Front:
             return chosen
         if self.best:
             return self.best[0 if goal.error is None else -1]
-        return min(self.tried, key=lambda tried: (-tried.score.flown, tried.score.ripple))
+        scores = [tried.score for tried in self.tried]
+        near = min(
+            range(len(scores)),
+            key=lambda k: (max(0.0, scores[k].growth), -scores[k].flown, scores[k].ripple),
+        )
+        return self.tried[near]
+
+    @property
+    def flown(self) -> int:
+        """Number of gain sets that were flown: all but those under which small motions grow."""
+        return sum(tried.score.growth <= 0.0 for tried in self.tried)
 
     def chosen(self, goal: Goal) -> Tried | None:
         """Return the gain set of a goal; None: none has so little ripple, or error."""
@@ -103,7 +116,8 @@ class Front:
     def why_none(self, goal: Goal) -> str:
         """Say why there is no gain set of a goal."""
         count, scores = len(self.tried), [tried.score for tried in self.tried]
-        ended = sum(score.flown < 1.0 for score in scores)
+        grows = sum(score.growth > 0.0 for score in scores)
+        ended = sum(score.flown < 1.0 for score in scores) - grows
         beyond = sum(score.beyond for score in scores)
         full = sum(score.saturation > ALLOWED_SATURATION for score in scores)
         if self.best and goal.error is not None:
@@ -111,8 +125,8 @@ class Front:
         if self.best:
             return f"ripple of at least {self.best[0].score.ripple:.1%} of the largest torque"
         return (
-            f"none of {count} gain sets: {ended} diverged, {beyond} beyond limits of effort, "
-            f"{full} with wheels at their limit"
+            f"none of {count} gain sets: {grows} unstable in some posture, {ended} diverged, "
+            f"{beyond} beyond limits of effort, {full} with wheels at their limit"
         )
 
 
@@ -141,18 +155,22 @@ def search_front(
     def fly(points: Sequence[Array]) -> None:
         scores = trials.fly([space.at(point) for point in points])
         front.tried.extend(map(Tried, points, scores))
-        progress(len(scores))
+        progress(sum(score.growth <= 0.0 for score in scores))
 
-    count = min(evaluations, max(BATCH, round(FIRST_DESIGN * evaluations / BATCH) * BATCH))
-    fly(_first_design(space, count, random))
+    fly([space.origin, *space.ladder][:evaluations])
+    first = min(evaluations, max(2 * BATCH, round(FIRST_DESIGN * evaluations / BATCH) * BATCH))
+    fly(_around(front.nearest(goal).point, first - len(front.tried), random))
     surrogates = Surrogates(space, goal.ripple)
-    while (left := evaluations - len(front.tried)) > 0:
-        part = (len(front.tried) - count) / (evaluations - count)
+    most = MOST_UNSTABLE * evaluations
+    while (left := evaluations - front.flown) > 0 and len(front.tried) < most:
+        part = min(1.0, max(0.0, (front.flown - first) / max(1, evaluations - first)))
         length = LONGEST * (SHORTEST / LONGEST) ** part
         points = np.array([tried.point for tried in front.tried])
-        if not surrogates.fit(points, [tried.score for tried in front.tried]):
+        scores = [tried.score for tried in front.tried]
+        if front.flown and all(score.flown < 1.0 for score in scores):
             fly(list(random.random((min(left, BATCH), space.dimension))))
             continue
+        surrogates.fit(points, scores)
         proposed = []
         for number in range(min(left, BATCH)):
             share = 1.0 if part > LAST_PART else shares[number % len(shares)]
@@ -165,13 +183,15 @@ def search_front(
     return front
 
 
-def _first_design(space: SearchSpace, count: int, random: np.random.Generator) -> list[Array]:
+def _around(best: Array, count: int, random: np.random.Generator) -> list[Array]:
     from scipy.stats import norm, qmc
 
-    power = math.ceil(math.log2(count)) if count > 1 else 0
-    spread = qmc.Sobol(space.dimension, seed=random).random_base2(power)[:count]
-    near = np.clip(space.origin + FIRST_SPREAD * norm.ppf(np.clip(spread, 0.01, 0.99)), 0.0, 1.0)
-    return [space.origin, *np.where(np.arange(count)[1:, None] % 3, near[1:], spread[1:])]
+    if count <= 0:
+        return []
+    power = math.ceil(math.log2(count))
+    spread = qmc.Sobol(len(best), seed=random).random_base2(power)[:count]
+    near = np.clip(best + FIRST_SPREAD * norm.ppf(np.clip(spread, 0.01, 0.99)), 0.0, 1.0)
+    return list(np.where(np.arange(count)[:, None] % 3 < 2, near, spread))
 
 
 def _propose(

@@ -27,16 +27,17 @@ from ..processes.executor import run_all
 from ..processes.scratch_folder import ScratchFolder
 from ..tuning.inertia import SAMPLING, sampled_reference
 from ..tuning.method import Tuned
-from ..tuning.task import AUTO, TuningOptions, force_demand
+from ..tuning.task import TuningOptions, force_demand
 from .criteria import CRITERIA
 from .front import SHARES_OF_RIPPLE, Front, Goal, Tried, search_front
 from .gain_files import write_gains
 from .search_space import GainPoint, SearchSpace
+from .start import first_points
 from .trials import Trials, Uncertainty
 
 Array = NDArray[np.float64]
 
-INITIAL_TUNING = TuningOptions(margin=0.05, mass_uncertainty=0.2, h_bar=AUTO)
+INITIAL_TUNING = TuningOptions(margin=0.05, mass_uncertainty=0.2)
 """Requirements on the gains from which the search starts."""
 
 WITHOUT_PAYLOAD = "1"
@@ -103,22 +104,22 @@ def prepare(
     for_tuning = {key: scenario[key] for key in TUNED if key in scenario}
     tuned = _tuned(for_tuning, str(scenario.get("case", WITHOUT_PAYLOAD)))
     write_set(tuned, command, folder / TUNED_SET)
-    points = {law: GainPoint(own.gains, tuned.corner_hz) for law, own in tuned.laws.items()}
-    bandwidths = {law: own.bandwidth for law, own in tuned.laws.items()}
     gains = f"{folder}/{TUNED_SET}"
     for law in names:
         kind = find_law(Law.parse(law).controller)
-        if "=" not in law and kind.name not in points:
+        if "=" not in law and kind.name not in tuned.laws:
             raise InputError(f"law {law}: has no tuned gains: give some, {law}=GAINS")
-    search = LawSearch(names, dict(scenario), gains, points, options, bandwidths)
+    search = LawSearch(names, dict(scenario), gains, {}, options)
     nominal = Scenario(**search.scenario_with(names[0])).check()
     known = nominal.scenario.robots.controller
     friction = coefficients(known, nominal.plant_settings.friction)[: known.n]
     if (duration := nominal.ticks * nominal.period) < SHORTEST_S:
         raise InputError(f"a search needs {SHORTEST_S:g} s of flight or more, got {duration:g} s")
+    peak = force_demand(known, nominal.scenario.mission, [nominal.scenario.plant]).peak
     search = replace(
         search,
-        torques=_largest_torques(nominal),
+        points=first_points(tuned, peak, options.ripple, nominal.period),
+        torques=_largest_torques(nominal, peak),
         friction=friction,
         duration=min(duration, max(options.trial_s, fast_at(nominal))),
         controls_base=nominal.controls_base,
@@ -142,11 +143,9 @@ def has_estimate(law: str) -> bool:
     return "h_bar" in kind.gain_descriptions() or kind.estimates_with_model
 
 
-def _largest_torques(flight: Flight) -> dict[str, float]:
-    scenario = flight.scenario
-    demand = force_demand(scenario.robots.controller, scenario.mission, [scenario.plant])
+def _largest_torques(flight: Flight, peak: Array) -> dict[str, float]:
     columns = AnalysedLog(empty_log(flight, 0, 1, is_brief=True)).torque_columns
-    return {name: float(np.mean(demand.peak[axes])) for name, axes in columns.items()}
+    return {name: float(np.mean(peak[axes])) for name, axes in columns.items()}
 
 
 def fast_at(flight: Flight) -> float:
@@ -169,8 +168,6 @@ class LawSearch:
     gains: str
     points: dict[str, GainPoint]
     options: ChoiceOptions
-    bandwidths: dict[str, float]
-    """W of the tuned gains by law, rad/s."""
     torques: dict[str, float] = field(default_factory=dict)
     friction: Array = field(default_factory=lambda: np.empty((0, 2)))
     """f_C and f_V (n, 2) of the joints as a user knows them."""
@@ -223,17 +220,11 @@ class LawSearch:
             corner = scenario.controller.acceleration_filter_hz
             start = GainPoint(scenario.law.gain_values, corner)
         assert start is not None
-        own, has_low_pass = find_law(controller), has_estimate(controller)
-        how = self.options.is_short, self._slower(controller)
-        return SearchSpace(own, start, self.friction, self.controls_base, has_low_pass, *how)
-
-    def _slower(self, controller: str) -> float | None:
-        wanted = self.options.bandwidth
-        if wanted is None:
-            return None
-        if controller not in self.bandwidths:
+        own, options, has_low_pass = find_law(controller), self.options, has_estimate(controller)
+        if options.bandwidth is not None and not start.bandwidth:
             raise InputError(f"law {controller}: has no bandwidth that is known")
-        return wanted / self.bandwidths[controller]
+        how = options.is_short, options.bandwidth
+        return SearchSpace(own, start, self.friction, self.controls_base, has_low_pass, *how)
 
 
 def tune_law(

@@ -25,7 +25,6 @@ from space_robot_msgs_py.errors import InputError
 from space_robot_sim.environment.environment import EnvironmentSettings
 
 from ..console.files import atomic_folder
-from ..tuning.gain_file import estimate_remark
 from ..tuning.task import force_demand
 from .gain_files import make_default
 from .law_search import TUNED_SET, ChoiceOptions
@@ -36,7 +35,9 @@ from .robot_files import CAMPAIGN_FILE, ROBOT_FILE
 TRIAL: Mapping[str, Any] = {"case": "1", "sensors": "fine", "navigation": "filtered"}
 """Friction and hardware with which the laws are compared."""
 CONDITIONS = "friction, sensors fine and navigation filtered"
-SHORT = ChoiceOptions(evaluations=48, trial_s=6.0, runs=6, is_short=True)
+HELD_S = 5.0
+"""The candidates fly the first leg, and this long after it, s."""
+SHORT = ChoiceOptions(evaluations=64, trial_s=6.0, runs=6, is_short=True)
 """How the law is chosen: shorter than `space-robot choose` does."""
 
 Array = NDArray[np.float64]
@@ -184,17 +185,18 @@ def make_robot(
         mission = rest_to_rest(robot)
         (place / OWN_MISSION).write_text(mission_text(robot, mission, command), "utf-8")
         gains = place / OWN_GAINS
-        choice, tuned = recommend({"robot": str(place), **TRIAL}, gains, options, command)
+        (leg, *_) = read_segments(mission.segments)
+        scenario = {"robot": str(place), **TRIAL, "duration": (leg.span or 0.0) + HELD_S}
+        choice, _ = recommend(scenario, gains, options, command)
         if choice.law:
             choice.install(gains, gains)
-            own = replace(choice, scenario={**choice.scenario, "robot": f"{folder}/"})
+            own = replace(choice, scenario={"robot": f"{folder}/", **TRIAL})
             text = campaign_text(own, folder / OWN_GAINS, command)
             (place / CAMPAIGN_FILE).write_text(text, "utf-8")
         else:
             make_default(TUNED_SET, gains)
     advice = (
         f"With {CONDITIONS}: {choice.sentence}",
-        estimate_remark(tuned),
         tool_remark(robot, folder),
         hinge_remark(robot, command, folder),
     )

@@ -25,6 +25,9 @@ from .gain_files import install, write_gains
 from .law_search import TUNED_SET, ChoiceOptions, has_estimate, prepare
 from .trials import Uncertainty
 
+FAR = 10.0
+"""A law with so many times the error of the best one in trials is out."""
+
 
 @dataclass(frozen=True)
 class Recommendation:
@@ -124,14 +127,18 @@ def recommend(
     fronts = {front.law: front for front in searched}
     out: dict[str, str] = {}
     candidates = []
+    best = {front.law: front.within(options.ripple) for front in searched}
+    leader = min(filter(None, best.values()), key=lambda tried: tried.score.error, default=None)
     for law, front in zip(names, searched, strict=True):
         controller = Law.parse(law).controller
-        tried = front.within(options.ripple)
-        if tried is None:
+        if (tried := best[front.law]) is None or leader is None:
             out[front.law] = front.why_none(options.goal)
             continue
         point = search.space(law).at(tried.point)
         where = write_gains(controller, point, folder / front.law, command, tried.score)
+        if (ratio := tried.score.error / leader.score.error) > FAR:
+            out[front.law] = f"{ratio:.3g} times the least error in trials"
+            continue
         candidates.append(Candidate(front.law, controller, point, tried.score, f"{where}/"))
     study = candidates_study(scenario, nominal, options.uncertainty)
     with counting_progress("flights of the candidates") as begin:

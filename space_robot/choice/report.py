@@ -139,7 +139,8 @@ def fronts_figure(fronts: Mapping[str, Front], chosen: str = "") -> Figure:
     axes.set_xlabel("ripple of the torques, % of the largest in the mission")
     axes.set_ylabel("error")
     axes.grid(True, which="major", alpha=0.3)
-    axes.legend(loc="center left", bbox_to_anchor=(1.01, 0.5), frameon=False)
+    if any(front.best for front in fronts.values()):
+        axes.legend(loc="center left", bbox_to_anchor=(1.01, 0.5), frameon=False)
     return figure
 
 

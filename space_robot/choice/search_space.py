@@ -8,8 +8,9 @@ joints each, or for all axes.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -47,6 +48,10 @@ def bandwidth(**powers: float) -> Factor:
     return Factor(BANDWIDTH, powers, 0.05, 50.0)
 
 
+SLOWEST_RAD_S, FASTEST_RAD_S = 0.1, 200.0
+"""Bandwidths between which is searched, where that of the start is known."""
+
+
 DAMPING = Factor("damping", {"k_d": 1.0}, 0.4, 2.5, is_common=True)
 H_BAR = Factor("inertia of the estimate", {"h_bar": 1.0}, 0.05, 20.0)
 INTEGRAL = Factor("integral", {"k_i": 1.0}, 1e-3, 0.5, is_common=True)
@@ -60,8 +65,10 @@ FILTER = "low-pass of the estimate"
 """The one factor on a number of the set instead of a law's: its corner frequency."""
 SLOWEST_HZ, FASTEST_HZ = 1.0, 900.0
 """Corner frequencies of low-passes between which is searched."""
-FIRST_HZ = 30.0
-"""Where the search begins if the set has none, or a faster one."""
+FIRST_HZ, FIRST_RAD_S = (30.0, 6.0, 1.2), (2.0, 8.0, 32.0)
+"""Low-passes and bandwidths with which the search begins."""
+WITHOUT_LOW_PASS = (1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0, 128.0)
+"""Bandwidths with which it does for laws without one."""
 AGAINST_FRICTION = (INTEGRAL, FRICTION, DEAD_BAND)
 KNOWN: Mapping[str, Sequence[Factor]] = {
     "pd": [bandwidth(k_p=2, k_d=1), DAMPING, *AGAINST_FRICTION],
@@ -105,8 +112,6 @@ KNOWN: Mapping[str, Sequence[Factor]] = {
 """Factors of the project's laws."""
 FROZEN = ("damping", "dead band", "boundary layer", "switching", "reaching", "adaptation")
 """Factors that a short search leaves as they begin."""
-ALIKE = ("inertia", "inertia of the estimate", "observer")
-"""Those that it has in common for all axes."""
 OWN_RANGE = 30.0
 """Factor by which each gain of a user's law is searched up and down, where it declares none."""
 
@@ -130,6 +135,8 @@ class GainPoint:
     """By name, (m,) each."""
     corner_hz: float
     """0: none."""
+    bandwidth: float = 0.0
+    """W, rad/s; 0: unknown."""
 
 
 class SearchSpace:
@@ -143,7 +150,7 @@ class SearchSpace:
         controls_base: bool,
         has_low_pass: bool,
         is_short: bool = False,
-        faster: float | None = None,
+        bandwidth: float | None = None,
     ) -> None:
         """Lay out the coordinates.
 
@@ -154,13 +161,13 @@ class SearchSpace:
             friction: f_C and f_V (n, 2) of the joints as they are known, N m and N m s/rad.
             controls_base: whether the base has actuators; else its gains are not searched.
             has_low_pass: whether the law has an estimate behind the low-pass of the set.
-            is_short: whether to search few numbers only, see `FROZEN` and `ALIKE`.
-            faster: factor on the bandwidth of the start, which is then not searched.
+            is_short: whether to search few numbers only, see `FROZEN`.
+            bandwidth: if given: of the law, rad/s, which is then not searched.
         """
         count = len(next(iter(start.gains.values())))
         zeros = {name: np.zeros(count) for name in law.gain_descriptions()}
         own = {name: values.copy() for name, values in start.gains.items()}
-        self.start = start = GainPoint({**zeros, **own}, start.corner_hz)
+        self.start = start = replace(start, gains={**zeros, **own})
         self._known = {name: np.zeros(count) for name in ("coulomb", "viscous", "dead_band")}
         self._known["coulomb"][BASE_AXES:], self._known["viscous"][BASE_AXES:] = friction.T
         self._known["dead_band"][BASE_AXES:] = DEAD_BAND_RATE
@@ -178,14 +185,15 @@ class SearchSpace:
                 for name in powers:
                     start.gains[name][:] = self._reference(name, start.gains)
                 continue
-            if faster is not None and factor.name == BANDWIDTH:
-                for name, power in powers.items():
-                    start.gains[name][:] *= faster**power
-                continue
-            is_common = factor.is_common or (is_short and factor.name in ALIKE)
-            of_parts = {"": slice(None)} if is_common else parts
+            low, high = factor.lowest, factor.highest
+            if factor.name == BANDWIDTH and start.bandwidth:
+                if bandwidth is not None:
+                    for name, power in powers.items():
+                        start.gains[name][:] *= (bandwidth / start.bandwidth) ** power
+                    continue
+                low, high = (w / start.bandwidth for w in (SLOWEST_RAD_S, FASTEST_RAD_S))
+            of_parts = {"": slice(None)} if factor.is_common else parts
             for part, axes in of_parts.items():
-                low, high = factor.lowest, factor.highest
                 if factor.is_low_pass:
                     fastest = float(max(np.max(start.gains[name][axes]) for name in powers))
                     low, high = (2.0 * np.pi * hz / fastest for hz in (SLOWEST_HZ, FASTEST_HZ))
@@ -210,13 +218,27 @@ class SearchSpace:
     def origin(self) -> Array:
         """The point (d,) of the start, with the known friction fed forward."""
         origin: Array = -self._low / (self._high - self._low)
-        slow = np.log(FIRST_HZ / SLOWEST_HZ) / np.log(FASTEST_HZ / SLOWEST_HZ)
         for k, coordinate in enumerate(self.coordinates):
-            if coordinate.is_low_pass:
-                origin[k] = min(origin[k], slow)
             if "k_i" in coordinate.powers and not self.start.gains["k_i"].any():
                 origin[k] = 0.5  # in the middle of its range
         return np.clip(origin, 0.0, 1.0)
+
+    @property
+    def ladder(self) -> list[Array]:
+        """The start with low-passes and bandwidths of all kinds."""
+        labels = [coordinate.label for coordinate in self.coordinates]
+        is_fast = np.array([label.endswith(f" {BANDWIDTH}") for label in labels])
+        is_low_pass = np.array([coordinate.is_low_pass for coordinate in self.coordinates])
+        has_low_pass = bool(is_low_pass.any())
+        corners = _shares(FIRST_HZ, SLOWEST_HZ, FASTEST_HZ) if has_low_pass else [0.0]
+        rates: Sequence[float] = FIRST_RAD_S if has_low_pass else WITHOUT_LOW_PASS
+        if not is_fast.any() or not self.start.bandwidth:
+            is_fast, rates = np.zeros_like(is_fast), rates[:1]
+        return [
+            np.where(is_fast, rate, np.where(is_low_pass, corner, self.origin))
+            for corner in corners
+            for rate in _shares(rates, SLOWEST_RAD_S, FASTEST_RAD_S)
+        ]
 
     def at(self, point: Array) -> GainPoint:
         """Return the gains at a point (d,)."""
@@ -228,7 +250,7 @@ class SearchSpace:
                 corner = float((self.start.corner_hz or FASTEST_HZ) * factor)
             for name, power in powers.items():
                 gains[name][axes] = self._reference(name, gains)[axes] * factor**power
-        return GainPoint(gains, corner)
+        return replace(self.start, gains=gains, corner_hz=corner)
 
     def _reference(self, name: str, gains: Mapping[str, Array]) -> Array:
         """Return what a factor on a gain (m,) counts from."""
@@ -237,6 +259,10 @@ class SearchSpace:
         if name == "k_i":
             return _fast_integral(gains)
         return self._known.get(name, gains[name])
+
+
+def _shares(values: Sequence[float], lowest: float, highest: float) -> list[float]:
+    return [math.log(value / lowest) / math.log(highest / lowest) for value in values]
 
 
 def _fast_integral(gains: Mapping[str, Array]) -> Array:

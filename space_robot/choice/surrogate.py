@@ -33,8 +33,12 @@ OWN_LENGTH, OTHER_LENGTH = 0.4, 4.0
 OF_THE_BASE = ("attitude", "base_torque")
 """Beginnings of the names of errors and torques that are the base's."""
 SATURATION_WEIGHT, BEYOND, FAILED = 20.0, 3.0, 1.0
-"""What is added to logarithms: of each ripple by the share of saturation beyond that, and by a
-joint beyond its effort; of all values by a flight that ended early, on the largest."""
+"""What is added to logarithms: of the base's ripple by the share of saturation beyond the allowed
+one, of the joints' by one beyond its effort, and of all by a flight that ended early."""
+
+GROWTH, SLOW, UNSTABLE = "growth", 0.1, 10.0
+"""Name of the process of growing motions; growth beyond which it counts by its logarithm, 1/s; what
+is added to the others' predictions by it."""
 
 
 class Surrogates:
@@ -51,22 +55,27 @@ class Surrogates:
         self._processes: dict[str, tuple[GaussianProcessRegressor, float, float]] = {}
         self._errors: tuple[str, ...] = ()
 
-    def fit(self, points: Array, scores: Sequence[Score]) -> bool:
-        """Fit the processes to scores at points (N, d); return False if none flew to its end."""
+    def fit(self, points: Array, scores: Sequence[Score]) -> None:
+        """Fit the processes to scores at points (N, d)."""
+        self._fit(GROWTH, points, np.arcsinh([score.growth / SLOW for score in scores]))
         flown = next((score for score in scores if score.flown >= 1.0), None)
         if flown is None:
-            return False
+            return
         self._errors = tuple(flown.errors)
+        rows = [row for row, score in enumerate(scores) if score.growth <= 0.0]
         for name in (*flown.errors, *flown.ripples):
-            values = self._compressed(name, scores)
-            mean, scale = float(np.mean(values)), float(np.std(values)) or 1.0
-            process, _, _ = self._processes.get(name) or (self._new_process(name), 0.0, 1.0)
-            with warnings.catch_warnings():
-                warnings.simplefilter("ignore")  # a length scale at its bound: no influence
-                process.fit(points, (values - mean) / scale)
-            process.kernel = process.kernel_  # from which the next fit begins
-            self._processes[name] = process, mean, scale
-        return True
+            self._fit(name, points[rows], self._compressed(name, [scores[row] for row in rows]))
+
+    def _fit(self, name: str, points: Array, values: Array) -> None:
+        mean, scale = float(np.mean(values)), float(np.std(values)) or 1.0
+        if name == GROWTH:
+            mean = 0.0  # beside which side it is on, it matters little
+        process, _, _ = self._processes.get(name) or (self._new_process(name), 0.0, 1.0)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # a length scale at its bound: no influence
+            process.fit(points, (values - mean) / scale)
+        process.kernel = process.kernel_  # from which the next fit begins
+        self._processes[name] = process, mean, scale
 
     def draw(self, random: np.random.Generator) -> dict[str, float]:
         """Draw how far each process is off its mean, in standard deviations."""
@@ -83,8 +92,11 @@ class Surrogates:
         for name, (process, mean, scale) in self._processes.items():
             own, deviation = process.predict(points, return_std=True)
             values[name] = mean + scale * (own + deviations[name] * deviation)
+        unstable = UNSTABLE * np.maximum(values.pop(GROWTH), 0.0)
+        if not self._errors:
+            return unstable, unstable + self._allowed
         error = mean_log({name: values.pop(name) for name in self._errors})
-        return error, np.max(list(values.values()), axis=0) + self._allowed
+        return error + unstable, np.max(list(values.values()), axis=0) + self._allowed + unstable
 
     def _compressed(self, name: str, scores: Sequence[Score]) -> Array:
         """Return values (N,), with what is far above the useful ones brought nearer."""
@@ -103,7 +115,7 @@ class Surrogates:
         # gains of the base hardly move the joints, and those of the joints the base
         others = JOINTS if name.startswith(OF_THE_BASE) else BASE
         lengths = [
-            OTHER_LENGTH if coordinate.label.startswith(others) else OWN_LENGTH
+            OTHER_LENGTH if name != GROWTH and coordinate.label.startswith(others) else OWN_LENGTH
             for coordinate in self._space.coordinates
         ]
         return GaussianProcessRegressor(
@@ -117,5 +129,7 @@ def _value(score: Score, name: str, is_error: bool) -> float:
         return math.nan
     if is_error:
         return score.errors[name]
-    excess = max(0.0, score.saturation - ALLOWED_SATURATION)
-    return score.ripples[name] + BEYOND * score.beyond + SATURATION_WEIGHT * excess
+    ripple = score.ripples[name]
+    if name.startswith(OF_THE_BASE):
+        return ripple + SATURATION_WEIGHT * max(0.0, score.saturation - ALLOWED_SATURATION)
+    return ripple + BEYOND * score.beyond

@@ -25,6 +25,7 @@ from ..flight.batch import fly_in_lanes
 from ..flight.plan import Flight
 from .criteria import Criterion, mean_log
 from .search_space import GainPoint
+from .stability import SmallMotions
 
 Array = NDArray[np.float64]
 
@@ -58,6 +59,11 @@ class Uncertainty:
             Deviation(1.0 - mass, 1.0 + scale, 1.0 - friction, self.latency_ticks),
             Deviation(1.0 + mass, 1.0 - scale, 1.0 + friction, 0),
         )
+
+    @property
+    def gain(self) -> float:
+        """Largest factor on the loop gain: by masses, torque, and a delay as one of the rates."""
+        return (1.0 + self.torque_scale) / (1.0 - self.mass) * (1.0 + self.latency_ticks)
 
     def vary(self, own_friction: bool) -> dict[str, Any]:
         """Return the same as distributions of a campaign.
@@ -105,6 +111,8 @@ class Score(NamedTuple):
     """Logarithms of the errors that count."""
     ripples: Mapping[str, float] = {}
     """Logarithms of the ripples as shares."""
+    growth: float = 0.0
+    """Of small motions along the mission, 1/s; above 0 nothing is flown."""
 
     @property
     def is_flyable(self) -> bool:
@@ -137,20 +145,38 @@ class Trials:
         self.law = self.nominal.resolved.law
         self._torques, self._criterion = torques, criterion
         self._variations = [self._variation(deviation) for deviation in uncertainty.deviations]
+        self._small = SmallMotions(
+            Flight(self.nominal.resolved), uncertainty.gain, 1.0 - uncertainty.friction
+        )
 
     def fly(self, points: Sequence[GainPoint]) -> list[Score]:
-        """Fly the trials of several gain sets in lanes, and score each."""
+        """Fly the trials of several gain sets in lanes, and score each.
+
+        Those under which small motions grow are not flown.
+        """
+        growth = [self._growth(point) for point in points]
         flights = [
-            self._flight(variation, point) for point in points for variation in self._variations
+            self._flight(variation, point)
+            for point, fastest in zip(points, growth, strict=True)
+            for variation in self._variations
+            if fastest <= 0.0
         ]
-        trials = [
+        trials = iter(
             {"flown": flown.log.ticks / flight.ticks}
             if flown.ending.error
             else {"flown": 1.0, **self._criterion.of(flown.log)}
             for flight, flown in zip(flights, fly_in_lanes(flights), strict=True)
+        )
+        return [
+            self._score([next(trials) for _ in self._variations])._replace(growth=fastest)
+            if fastest <= 0.0
+            else Score(math.inf, math.inf, 0.0, 0.0, False, {}, growth=fastest)
+            for fastest in growth
         ]
-        count = len(self._variations)
-        return [self._score(trials[k : k + count]) for k in range(0, len(trials), count)]
+
+    def _growth(self, point: GainPoint) -> float:
+        law = type(self.law)(dict(point.gains), self.law.period)
+        return self._small.growth(law, point.corner_hz)
 
     def _variation(self, deviation: Deviation) -> Variation:
         tree, changed = self.nominal.tree, dict[Path, Any]()

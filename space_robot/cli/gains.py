@@ -141,11 +141,11 @@ class TypedCommand(click.Command):
 @click.option(
     "--h-bar",
     "h_bar",
-    type=click.Choice(["constant", "nominal", "auto"]),
+    type=click.Choice(["constant", "nominal"]),
     default="constant",
     show_default=True,
-    help="Without --law, inertia of the laws with time-delay estimation: a constant diagonal, H_S "
-    "of the nominal model, or that one only where no diagonal will do.",
+    help="Without --law, inertia of the laws with time-delay estimation: a constant diagonal, or "
+    "H_S of the nominal model.",
 )
 @click.option(
     "-o",

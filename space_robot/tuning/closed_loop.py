@@ -16,7 +16,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from functools import partial
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -47,10 +47,21 @@ class SmallMotion(NamedTuple):
     """As a law with a model knows it."""
 
 
-def rigid_motion(inertia: Array, posture: Posture, period: float) -> SmallMotion:
-    """Return the motions ``H rhodd = F`` of a rigid robot, ``inertia`` H (m, m)."""
+def rigid_motion(
+    inertia: Array, posture: Posture, period: float, damping: Array | None = None
+) -> SmallMotion:
+    """Return the motions ``H rhodd + d rhod = F`` of a rigid robot, ``inertia`` H (m, m).
+
+    ``damping``: d (m,), N m s/rad; None: none.
+    """
     axes = len(inertia)
     one, none, compliance = np.eye(axes), np.zeros((axes, axes)), np.linalg.inv(inertia)
+    if damping is not None:
+        from scipy.linalg import expm  # slow to import
+
+        rates: Any = [[none, one, none], [none, -compliance * damping, compliance], [none] * 3]
+        whole = expm(period * np.block(rates))[: 2 * axes]
+        return SmallMotion(whole[:, : 2 * axes], whole[:, 2 * axes :], one, posture)
     step = np.block([[one, period * one], [none, one]])
     by_force = np.vstack([0.5 * period**2 * compliance, period * compliance])
     return SmallMotion(step, by_force, one, posture)
@@ -138,7 +149,12 @@ class RigidLoop:
     """A law on a rigid robot in some postures."""
 
     def __init__(
-        self, inertia: Array, postures: Sequence[Posture], laws: Sequence[LinearLaw], weight: float
+        self,
+        inertia: Array,
+        postures: Sequence[Posture],
+        laws: Sequence[LinearLaw],
+        weight: float,
+        damping: Array | None = None,
     ) -> None:
         """Close the loop.
 
@@ -147,9 +163,11 @@ class RigidLoop:
             postures: (K,) of the nominal robot.
             laws: (K,) in these postures.
             weight: of the low-pass of the time-delay pair; 1: none.
+            damping: see `rigid_motion`.
         """
         period = laws[0].period
-        motions = [rigid_motion(*pair, period) for pair in zip(inertia, postures, strict=True)]
+        pairs = zip(inertia, postures, strict=True)
+        motions = [rigid_motion(*pair, period, damping) for pair in pairs]
         self._parts = list(zip(motions, laws, strict=True))
         self._weight = weight
 

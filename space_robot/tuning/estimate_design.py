@@ -23,8 +23,6 @@ LEAST_WEIGHT = 1e-4
 """Smallest weight of a low-pass: a corner of 0.03 Hz at 2 kHz."""
 BISECTIONS = 12
 """Of a weight's logarithm: it is then more precise than the written digits."""
-MUCH_SLOWER = 0.1
-"""A law is weak below this share of the bandwidth of the laws with a model."""
 
 
 @dataclass(frozen=True)
@@ -150,14 +148,6 @@ def check_estimate(task: TuningTask, design: EstimateDesign) -> None:
             f"bandwidth must be at most {2.0 * design.fastest:.3g} rad/s, half of the pole of an "
             f"estimate with this margin and lag, got {design.bandwidth:g}"
         )
-
-
-def is_weak(design: EstimateDesign, task: TuningTask) -> bool:
-    """Return True if the laws of an estimate are much slower than those with a model."""
-    return (
-        design.bandwidth < MUCH_SLOWER * model_bandwidth(task)
-        or design.bandwidth > 2.0 * design.fastest
-    )
 
 
 def model_bandwidth(task: TuningTask, own: Array | None = None) -> float:

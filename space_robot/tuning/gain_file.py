@@ -10,10 +10,9 @@ from numpy.typing import NDArray
 from space_robot_control.controller.gains import NOMINAL_H_BAR as IN_FILES
 from space_robot_control.controller.settings import OF_THE_SET
 
-from .estimate_design import MUCH_SLOWER
 from .law_gains import TunedLaw
 from .method import Tuned
-from .task import AUTO, NOMINAL
+from .task import NOMINAL
 
 Array = NDArray[np.float64]
 
@@ -51,25 +50,20 @@ def gain_files(tuned: Tuned, command: str) -> Mapping[str, str]:
     return files
 
 
+MUCH_SLOWER = 0.1
+"""A law is weak below this share of the bandwidth of the laws with a model."""
+
+
 def estimate_remark(tuned: Tuned) -> str:
     """Return a remark if a constant h_bar does not suit a set's robot; else empty.
 
-    Its laws with time-delay estimation are then weak, with less than a tenth of the bandwidth of
-    those with a model, or they have the nominal inertia.
+    Its laws with time-delay estimation then have less than a tenth of the bandwidth of those with a
+    model.
     """
-    design, constant = tuned.design, tuned.constant
-    eigen = f"eigenvalues of H_S^-1 h_bar {constant.smallest:.2g} to {constant.largest:.3g}"
-    if design.kind == NOMINAL:
-        if tuned.options.h_bar != AUTO:
-            return ""
-        return (
-            "The laws with time-delay estimation use the inertia of the nominal model, because no "
-            f"diagonal h_bar suits light and heavy directions of this robot at once ({eigen}); dob "
-            f"and adrc have one, and {tuned.laws['dob'].bandwidth:.2g} and "
-            f"{tuned.laws['adrc'].bandwidth:.2g} rad/s."
-        )
-    if design.bandwidth >= MUCH_SLOWER * tuned.model_bandwidth:
+    design = tuned.design
+    if design.kind == NOMINAL or design.bandwidth >= MUCH_SLOWER * tuned.model_bandwidth:
         return ""
+    eigen = f"eigenvalues of H_S^-1 h_bar {design.smallest:.2g} to {design.largest:.3g}"
     return (
         f"The laws with time-delay estimation are weak: {design.bandwidth:.2g} rad/s, those with a "
         f"model {tuned.model_bandwidth:.2g} (no diagonal h_bar suits light and heavy directions at "

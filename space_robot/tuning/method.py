@@ -35,9 +35,7 @@ choose: lambda is near 1. The low-pass (3) has ``w max(lambda) / (1 - mu) <= 1``
 so its delay is ``delta / w``; W is as that of INDI. The errors (5) are accelerations by
 ``|H_S^-1| h_bar eps`` in the worst posture, times the largest share at which ``K_1^2 delta / 2``,
 by which the super-twisting term switches in discrete time, remains within the allowed ripple of
-the force, ``|H_S| K_1^2 delta / 2``: K_1 of one axis moves all axes here. It is used on
-request, or (``auto``) where the laws with a constant h_bar would have less than a tenth of the
-bandwidth of the laws with a model.
+the force, ``|H_S| K_1^2 delta / 2``: K_1 of one axis moves all axes here.
 """
 
 from __future__ import annotations
@@ -55,7 +53,6 @@ from .estimate_design import (
     EstimateDesign,
     check_estimate,
     constant_estimate,
-    is_weak,
     model_bandwidth,
     nominal_estimate,
     with_weight,
@@ -70,7 +67,7 @@ from .law_gains import (
     tune_dob,
     tune_indi,
 )
-from .task import AUTO, NOMINAL, ForceDemand, Noise, TuningOptions, TuningTask, axis_inertia
+from .task import NOMINAL, ForceDemand, Noise, TuningOptions, TuningTask, axis_inertia
 
 Array = NDArray[np.float64]
 
@@ -127,7 +124,7 @@ def tune(
     if has_gears:  # the low-pass is also that of `indi`, whose inertia is far above the motors'
         constant = with_weight(task, first, min(first.weight, nominal_estimate(task).weight))
     design = constant
-    if options.h_bar == NOMINAL or (options.h_bar == AUTO and is_weak(constant, task)):
+    if options.h_bar == NOMINAL:
         design = nominal_estimate(task)
     check_estimate(task, design)
     tuned = {name: rule(task, design) for name, rule in WITH_ESTIMATE.items()}

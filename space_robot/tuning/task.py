@@ -39,7 +39,7 @@ from .inertia import J0, SAMPLING, Posture, sampled_reference
 
 Array = NDArray[np.float64]
 
-CONSTANT, NOMINAL, AUTO = "constant", "nominal", "auto"
+CONSTANT, NOMINAL = "constant", "nominal"
 """Inertia of the laws with time-delay estimation: see `TuningOptions`."""
 SEPARATION = 4.0
 """Ratio of the estimate's pole to the poles of the loop; see step 4 of `method`."""
@@ -64,8 +64,7 @@ class TuningOptions:
     ripple: float = 0.1
     """Allowed RMS force by noise, as a share of the largest force of an axis."""
     h_bar: str = CONSTANT
-    """Inertia of the laws with time-delay estimation: `CONSTANT`, `NOMINAL`, or `AUTO`, the nominal
-    one where no diagonal matrix will do."""
+    """Inertia of the laws with time-delay estimation: `CONSTANT` or `NOMINAL`."""
 
 
 @dataclass(frozen=True)

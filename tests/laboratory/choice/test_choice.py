@@ -16,9 +16,12 @@ from space_robot.choice.criteria import CRITERIA
 from space_robot.choice.front import Front, Tried
 from space_robot.choice.law_search import has_estimate
 from space_robot.choice.search_space import FASTEST_HZ, SLOWEST_HZ, GainPoint, SearchSpace
+from space_robot.choice.stability import SmallMotions
 from space_robot.choice.trials import Score
 from space_robot.cli.main import cli
-from space_robot.flight.plan import Scenario, resolve
+from space_robot.flight.plan import Flight, Scenario, resolve
+from space_robot.tuning.gain_check import check_gains
+from space_robot.tuning.inertia import inertia_along, postures_along
 from space_robot_control.laws import find_law, laws
 from space_robot_msgs_py.errors import InputError
 
@@ -62,6 +65,27 @@ def test_gains_of_one_bandwidth_move_as_its_powers_and_on_their_own_axes() -> No
     np.testing.assert_allclose(ratio["k_d"][:3], coordinate.highest)
     np.testing.assert_allclose(ratio["k_p"][:3], coordinate.highest**2)
     np.testing.assert_allclose([ratio[name][3:] for name in KP_KD], 1.0)
+
+
+def test_motions_grow_at_other_gains_than_those_tuned_and_viscous_friction_damps_them() -> None:
+    """Of PD with an integral: along the mission, as `gains check` has it without friction."""
+    flight = Flight(resolve(Scenario(controller="pd", gains="tuned")))
+    tuned = flight.law.gain_values
+    integral = {**tuned, "k_i": 0.6 * tuned["k_p"] ** 2 / tuned["k_d"]}
+    free, damped = SmallMotions(flight, 1.0, 0.0), SmallMotions(flight, 1.0, 1.0)
+    laws = [type(flight.law)(gains, flight.period) for gains in (tuned, integral)]
+    checked = [
+        check_gains(law, inertia_along(flight.robot, flight.mission_settings, 1.0), postures)
+        for postures in [postures_along(flight.robot, flight.mission_settings, 1.0)]
+        for law in laws
+    ]
+    for law, check in zip(laws, checked, strict=True):
+        assert (free.growth(law, 0.0) <= 0.0) == check.loop.is_stable
+        assert damped.growth(law, 0.0) < free.growth(law, 0.0)
+    assert checked[0].loop.is_stable
+    assert not checked[1].loop.is_stable
+    fastest = (checked[1].loop.radius - 1.0) / flight.period
+    assert free.growth(laws[1], 0.0) == pytest.approx(fastest, rel=0.1)
 
 
 KP_KD = ("k_p", "k_d")
