@@ -35,7 +35,7 @@ SHORTER = {
     r"fly .*(kill|stop)_": "--duration {}",
     r"fly": "--composed --duration 0.2",
     r"choose": "--law ctc --law pd --evaluations 2 --runs 2 --duration 1.1 --ripple 10 --workers 0",
-    r"gains tune --law": "--evaluations 2 --ripple 10",
+    r"gains tune --law": "--evaluations 8 --ripple 10",
     r"new .*(--(force|passive)|geared)": "--help",  # tests/laboratory/cli/test_new_command.py
     r"new (robot )?\S+\.(urdf|yaml)": "--law ctc --law pd --evaluations 1 --runs 2 --workers 0",
     r"reproduce": "--only tde_stc/1 --duration 0.2 --jobs 1",

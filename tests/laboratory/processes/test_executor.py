@@ -111,7 +111,7 @@ def test_workers_end_with_their_starter(number: signal.Signals) -> None:
         left = [psutil.Process(pid) for pid in pids]
         assert len(left) == 3
         process.send_signal(number)
-        _, errors = process.communicate(timeout=20.0)
+        _, errors = process.communicate(timeout=120.0)
     finally:
         process.kill()
     assert not psutil.wait_procs(left, 120.0)[1]
