@@ -20,7 +20,7 @@ from ..flight.batch import fly_in_lanes
 from ..processes.executor import run_all
 from .criteria import CRITERIA, Criterion, is_error
 from .search_space import GainPoint
-from .trials import Score
+from .trials import HELD, Score
 
 Array = NDArray[np.float64]
 
@@ -28,8 +28,6 @@ OFTEN = 0.1
 """Share of the flights with a limit cycle, or ended early, from which on a law is out."""
 MOST_SATURATION = 0.05
 """Largest median share of ticks with a wheel at its limit."""
-HELD = 0.5
-"""Largest median share of its way on which friction may hold a joint."""
 GROUP = 8
 """Flights that a process takes at a time."""
 

@@ -119,6 +119,7 @@ class Front:
         grows = sum(score.growth > 0.0 for score in scores)
         ended = sum(score.flown < 1.0 for score in scores) - grows
         beyond = sum(score.beyond for score in scores)
+        held = sum(score.held for score in scores)
         full = sum(score.saturation > ALLOWED_SATURATION for score in scores)
         if self.best and goal.error is not None:
             return f"error of at least {self.best[-1].score.error:.3g}"
@@ -126,7 +127,8 @@ class Front:
             return f"ripple of at least {self.best[0].score.ripple:.1%} of the largest torque"
         return (
             f"none of {count} gain sets: {grows} unstable in some posture, {ended} diverged, "
-            f"{beyond} beyond limits of effort, {full} with wheels at their limit"
+            f"{beyond} beyond limits of effort, {held} held by friction, "
+            f"{full} with wheels at their limit"
         )
 
 

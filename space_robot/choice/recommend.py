@@ -20,13 +20,16 @@ from ..processes.scratch_folder import ScratchFolder
 from ..tuning.method import Tuned
 from .candidates import Candidate, FlownCandidate, comparisons, fly_candidates, ranked
 from .criteria import CRITERIA
-from .front import Front
+from .front import Front, Tried
 from .gain_files import install, write_gains
 from .law_search import TUNED_SET, ChoiceOptions, has_estimate, prepare
 from .trials import Uncertainty
 
-FAR = 10.0
-"""A law with so many times the error of the best one in trials is out."""
+FAR, FEWEST = 10.0, 4
+"""A law with so many times the error of the best one in trials is out, unless it is one of the best
+few."""
+QUIETER = (1.0, 0.5, 0.25)
+"""Shares of the ripple allowed at which a law flies the draws, until it is not out."""
 
 
 @dataclass(frozen=True)
@@ -125,26 +128,35 @@ def recommend(
         names, searched = search.laws, search.fronts()
     write_set(tuned, command, folder / TUNED_SET)
     fronts = {front.law: front for front in searched}
-    out: dict[str, str] = {}
-    candidates = []
-    best = {front.law: front.within(options.ripple) for front in searched}
-    leader = min(filter(None, best.values()), key=lambda tried: tried.score.error, default=None)
-    for law, front in zip(names, searched, strict=True):
-        controller = Law.parse(law).controller
-        if (tried := best[front.law]) is None or leader is None:
-            out[front.law] = front.why_none(options.goal)
-            continue
-        point = search.space(law).at(tried.point)
+    best = {f.law: tried for f in searched if (tried := f.within(options.ripple))}
+    out = {f.law: f.why_none(options.goal) for f in searched if f.law not in best}
+    by_error = sorted(best, key=lambda law: best[law].score.error)
+    for law in by_error[FEWEST:]:
+        if (ratio := best[law].score.error / best[by_error[0]].score.error) > FAR:
+            out[law] = f"{ratio:.3g} times the least error in trials"
+
+    def candidate(name: str, front: Front, tried: Tried) -> Candidate:
+        controller, point = Law.parse(name).controller, search.space(name).at(tried.point)
         where = write_gains(controller, point, folder / front.law, command, tried.score)
-        if (ratio := tried.score.error / leader.score.error) > FAR:
-            out[front.law] = f"{ratio:.3g} times the least error in trials"
-            continue
-        candidates.append(Candidate(front.law, controller, point, tried.score, f"{where}/"))
+        return Candidate(front.law, controller, point, tried.score, f"{where}/")
+
     study = candidates_study(scenario, nominal, options.uncertainty)
-    with counting_progress("flights of the candidates") as begin:
-        flown = fly_candidates(
-            study, candidates, options.criterion, options.runs, options.seed, options.workers, begin
-        )
+    by_law: dict[str, FlownCandidate] = {}
+    for share in QUIETER:
+        candidates = []
+        for name, front in zip(names, searched, strict=True):
+            tried = front.within(share * options.ripple)
+            before = by_law.get(front.law)
+            if tried is None or (before and not before.reason) or (share < 1.0 and not before):
+                continue
+            if not before or tried.score is not before.candidate.score:
+                own = candidate(name, front, tried)
+                candidates += [] if front.law in out else [own]
+        if candidates:
+            with counting_progress("flights of the candidates") as begin:
+                how = options.criterion, options.runs, options.seed, options.workers, begin
+                by_law |= {each.law: each for each in fly_candidates(study, candidates, *how)}
+    flown = list(by_law.values())
     criterion = CRITERIA[options.criterion]
     order = ranked(flown, criterion)
     out |= {each.law: each.reason for each in flown if each.reason}

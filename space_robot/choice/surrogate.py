@@ -34,7 +34,7 @@ OF_THE_BASE = ("attitude", "base_torque")
 """Beginnings of the names of errors and torques that are the base's."""
 SATURATION_WEIGHT, BEYOND, FAILED = 20.0, 3.0, 1.0
 """What is added to logarithms: of the base's ripple by the share of saturation beyond the allowed
-one, of the joints' by one beyond its effort, and of all by a flight that ended early."""
+one, of the joints' by one beyond its effort or held, and of all by a flight that ended early."""
 
 GROWTH, SLOW, UNSTABLE = "growth", 0.1, 10.0
 """Name of the process of growing motions; growth beyond which it counts by its logarithm, 1/s; what
@@ -132,4 +132,4 @@ def _value(score: Score, name: str, is_error: bool) -> float:
     ripple = score.ripples[name]
     if name.startswith(OF_THE_BASE):
         return ripple + SATURATION_WEIGHT * max(0.0, score.saturation - ALLOWED_SATURATION)
-    return ripple + BEYOND * score.beyond
+    return ripple + BEYOND * (score.beyond + score.held)

@@ -31,6 +31,8 @@ Array = NDArray[np.float64]
 
 ALLOWED_SATURATION = 0.01
 """Largest share of ticks with a wheel at its limit."""
+HELD = 0.5
+"""Largest share of its way on which friction may hold a joint."""
 
 
 class Deviation(NamedTuple):
@@ -111,13 +113,16 @@ class Score(NamedTuple):
     """Logarithms of the errors that count."""
     ripples: Mapping[str, float] = {}
     """Logarithms of the ripples as shares."""
+    held: bool = False
+    """True if friction held a joint on much of its way."""
     growth: float = 0.0
     """Of small motions along the mission, 1/s; above 0 nothing is flown."""
 
     @property
     def is_flyable(self) -> bool:
         """True if all trials were flown within the limits of joints and wheels."""
-        return self.flown >= 1.0 and not self.beyond and self.saturation <= ALLOWED_SATURATION
+        is_free = not (self.beyond or self.held)
+        return self.flown >= 1.0 and is_free and self.saturation <= ALLOWED_SATURATION
 
 
 class Trials:
@@ -230,4 +235,5 @@ class Trials:
             mean,
             errors,
             ripples,
+            any(value > HELD for name, value in mean.items() if name.endswith(".standing")),
         )
