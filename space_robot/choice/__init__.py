@@ -2,9 +2,12 @@
 
 | module | |
 |---|---|
-| `search_space` | the gains of a law as a few factors on a tuned set |
+| `search_space` | the gains of a law as a few factors on those of the start |
+| `start` | gains from which a search begins |
+| `stability` | small motions under a gain set along the whole mission |
 | `trials` | flights of a gain set with a light and a heavy robot, and its score |
 | `front` | the search for the least error at each ripple |
+| `surrogate` | what trials would show, predicted for the search |
 | `candidates` | one gain set a law, flown with many draws; who is out, and the ranks |
 | `law_search` | the search of one law or several for a scenario |
 | `recommend` | all of it for a scenario |

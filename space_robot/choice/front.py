@@ -95,12 +95,9 @@ class Front:
             return chosen
         if self.best:
             return self.best[0 if goal.error is None else -1]
-        scores = [tried.score for tried in self.tried]
-        near = min(
-            range(len(scores)),
-            key=lambda k: (max(0.0, scores[k].growth), -scores[k].flown, scores[k].ripple),
+        return min(
+            self.tried, key=lambda t: (max(0.0, t.score.growth), -t.score.flown, t.score.ripple)
         )
-        return self.tried[near]
 
     @property
     def flown(self) -> int:

@@ -23,8 +23,6 @@ Array = NDArray[np.float64]
 BASE_AXES = 3
 BASE, JOINTS = "base ", "joints "
 """Beginnings of the labels of coordinates on their axes."""
-
-
 BANDWIDTH = "bandwidth"
 """Name of the factor on the poles of a law."""
 

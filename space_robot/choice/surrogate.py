@@ -69,7 +69,7 @@ class Surrogates:
     def _fit(self, name: str, points: Array, values: Array) -> None:
         mean, scale = float(np.mean(values)), float(np.std(values)) or 1.0
         if name == GROWTH:
-            mean = 0.0  # beside which side it is on, it matters little
+            mean = 0.0  # zero remains the border between stable and unstable
         process, _, _ = self._processes.get(name) or (self._new_process(name), 0.0, 1.0)
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # a length scale at its bound: no influence
