@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import time
 from contextlib import suppress
 from typing import Any, NamedTuple
 
@@ -17,6 +16,7 @@ from space_robot_msgs_py.wire.definitions import decode
 from space_robot_msgs_py.wire.messages import TELEMETRY_ROWS
 from space_robot_msgs_py.wire.telemetry import TelemetryCodec
 
+from .node_names import PLANT
 from .node_services import TemporaryNode
 
 Array = NDArray[np.float64]
@@ -65,8 +65,8 @@ class Monitor:
         self._levels: dict[str, int] = {}
         self.values: dict[str, dict[str, str]] = {}
         """The values that each node reported last."""
-        self.heard_at: dict[str, float] = {}
-        """The time of each node's last report, by the monotonic clock."""
+        self.silence: dict[str, int] = {}
+        """How often the plant has reported since each node's last report."""
 
     def poll(self) -> list[Event]:
         """Take the newest messages; return the nodes' relevant changes of mode."""
@@ -104,7 +104,9 @@ class Monitor:
         mode = status.message
         if not (name := relative(f"/{status.name}", self._namespace)):
             return []
-        self.heard_at[name] = time.monotonic()
+        if name == PLANT:
+            self.silence = {node: reports + 1 for node, reports in self.silence.items()}
+        self.silence[name] = 0
         self.values[name] = {item.key: item.value for item in status.values}
         before, self.modes[name] = self.modes.get(name), mode
         level_before, self._levels[name] = self._levels.get(name, 0), status.level
