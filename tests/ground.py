@@ -19,8 +19,9 @@ from lifecycle_msgs.srv import ChangeState, GetState  # noqa: E402
 from rclpy.executors import SingleThreadedExecutor  # noqa: E402
 
 from space_robot.flight.graph.monitor import Monitor  # noqa: E402
+from space_robot.flight.graph.node_services import change_state  # noqa: E402
 
-TIMEOUT_S = 30.0
+TIMEOUT_S, AGAIN_S = 240.0, 30.0
 
 
 def request(transition: str) -> Any:
@@ -48,16 +49,19 @@ class Ground:
         client = self.node.create_client(service, name)
         try:
             assert client.wait_for_service(TIMEOUT_S), name
-            future = client.call_async(request)
-            self._executor.spin_until_future_complete(future, TIMEOUT_S)
-            assert future.done(), name
-            return future.result()
+            for _ in range(round(TIMEOUT_S / AGAIN_S)):  # an answer may be lost
+                future = client.call_async(request)
+                self._executor.spin_until_future_complete(future, AGAIN_S)
+                if future.done():
+                    return future.result()
+            raise AssertionError(name)
         finally:
             self.node.destroy_client(client)
 
     def change(self, node: str, transition: str) -> bool:
-        service = f"/{node}_node/change_state"
-        return bool(self.call(ChangeState, service, request(transition)).success)
+        refused = change_state(self.node, [f"{node}_node"], transition, lambda: None)
+        self._executor.add_node(self.node)
+        return not refused
 
     def change_at_once(
         self, node: str, process: subprocess.Popen[str], *transitions: str

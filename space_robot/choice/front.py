@@ -3,7 +3,7 @@
 After a first design (the start with several bandwidths and low-passes, gain sets around the best of
 these and over the whole space) the search goes on in batches. Gain sets under which small motions
 grow in some posture of the mission are not flown, and do not count. Each proposal has the least
-error with a ripple of at most a share of the one that the user allows (`SHARES_OF_RIPPLE`), or the
+error with a ripple of at most a share of the one that the user allows (`RIPPLE_SHARES`), or the
 least ripple with an error, by what the `surrogate` predicts, each of its processes a random number
 of standard deviations off its mean (as in Berk et al., Randomised Gaussian process upper confidence
 bound for Bayesian optimisation, arXiv:2006.04296). Candidates are in a region around the best gain
@@ -28,7 +28,7 @@ from .trials import ALLOWED_SATURATION, Score, Trials
 
 Array = NDArray[np.float64]
 
-SHARES_OF_RIPPLE = (1.0, 0.3, 1.0, 0.1, 1.0, 3.0, 1.0, 1.0)
+RIPPLE_SHARES = (1.0, 0.3, 1.0, 0.1, 1.0, 3.0, 1.0, 1.0)
 """Ripples of a batch's gain sets, as shares of the one allowed."""
 BATCH = 8
 """Gain sets of a batch: two batches of lanes, with two trials each."""
@@ -135,7 +135,7 @@ def search_front(
     goal: Goal,
     evaluations: int,
     seed: int,
-    shares: Sequence[float] = SHARES_OF_RIPPLE,
+    shares: Sequence[float] = RIPPLE_SHARES,
     progress: Callable[[int], object] = lambda count: None,
 ) -> Front:
     """Search the front of a law.

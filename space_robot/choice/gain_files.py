@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from space_robot_control.controller.settings import DEFAULT_SETS, OF_THE_SET, OTHERS
+from space_robot_control.controller.settings import DEFAULT_SETS, OTHERS, SET_FILE
 from space_robot_control.laws import find_law
 
 from ..console.files import make_folder, write_text
@@ -40,7 +40,7 @@ def write_gains(
         f"{score.ripple:.2%} of the largest torque.",
     ]
     write_text(gain_text(comments, law, point.gains), folder / f"{law}.yaml", replace=True)
-    write_text(set_text(comments, point.corner_hz), folder / OF_THE_SET, replace=True)
+    write_text(set_text(comments, point.corner_hz), folder / SET_FILE, replace=True)
     return folder
 
 
@@ -49,7 +49,7 @@ def install(files: Sequence[Path], set_file: Path, law: str, gains: Path) -> Pat
 
     Args:
         files: of the set's laws.
-        set_file: `OF_THE_SET` with the low-pass of all of them.
+        set_file: `SET_FILE` with the low-pass of all of them.
         law: the default law.
         gains: folder of the robot's gains.
 
@@ -66,7 +66,7 @@ def install(files: Sequence[Path], set_file: Path, law: str, gains: Path) -> Pat
     text = set_file.read_text("utf-8")
     write_text(
         f"{text}    controller: {law}  # flown unless another is named\n",
-        folder / OF_THE_SET,
+        folder / SET_FILE,
         replace=True,
     )
     make_default(CHOSEN, gains)

@@ -29,7 +29,7 @@ from ..tuning.inertia import SAMPLING, sampled_reference
 from ..tuning.method import Tuned
 from ..tuning.task import TuningOptions, force_demand
 from .criteria import CRITERIA
-from .front import SHARES_OF_RIPPLE, Front, Goal, Tried, search_front
+from .front import RIPPLE_SHARES, Front, Goal, Tried, search_front
 from .gain_files import write_gains
 from .search_space import GainPoint, SearchSpace
 from .start import first_points
@@ -192,7 +192,7 @@ class LawSearch:
                 file.write(bytes(count))
 
         goal, count, seed = options.goal, options.evaluations, options.seed
-        shares = (1.0,) if options.is_short else SHARES_OF_RIPPLE
+        shares = (1.0,) if options.is_short else RIPPLE_SHARES
         return search_front(trials, self.space(law), goal, count, seed, shares, note)
 
     def fronts(self) -> list[Front]:

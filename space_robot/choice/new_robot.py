@@ -47,7 +47,7 @@ LEG_S = 10.0
 LONGEST_LEG_S = 600.0
 TURN, SLIDE = math.radians(30.0), 0.25
 """Largest displacement of a joint from its start: rad, m."""
-OF_THE_RANGE, OF_THE_LIMITS = 0.25, 0.5
+RANGE_SHARE, LIMIT_SHARE = 0.25, 0.5
 """Largest displacement as a share of the joint's range; largest velocity and effort as shares of
 their limits."""
 BASE_TORQUE = 0.2 / 300.0
@@ -71,21 +71,21 @@ def rest_to_rest(robot: Robot) -> MissionSettings:
         np.array(column) for column in zip(*robot.limits, strict=True)
     )
     most = np.where(robot.is_prismatic[: robot.n], SLIDE, TURN)
-    way = np.minimum(most, OF_THE_RANGE * (upper - lower))
+    way = np.minimum(most, RANGE_SHARE * (upper - lower))
     start = np.clip(0.0, lower + way, upper - way)
     signs = np.where(np.arange(robot.n) % 2, -1.0, 1.0)
     points = np.array([start, start + signs * way, start - 0.5 * signs * way])
     longest = np.abs(np.diff(points, axis=0)).max(axis=0)
-    leg = max(LEG_S, float(np.max(PEAK_VELOCITY * longest / (OF_THE_LIMITS * velocity))))
+    leg = max(LEG_S, float(np.max(PEAK_VELOCITY * longest / (LIMIT_SHARE * velocity))))
     asked = force_demand(nominal, _mission(robot, points, leg), [EnvironmentSettings()]).nominal
-    leg *= max(1.0, math.sqrt(float(np.max(asked[3:] / (OF_THE_LIMITS * effort)))))
+    leg *= max(1.0, math.sqrt(float(np.max(asked[3:] / (LIMIT_SHARE * effort)))))
     leg = math.ceil(leg)
     if leg > LONGEST_LEG_S:
         raise InputError(
             f"robot {robot.name!r}: with its limits of velocity and effort the legs of a mission "
             f"would last {leg} s: write a mission by hand"
         )
-    usual = OF_THE_LIMITS * BASE_TORQUE * float(np.sum(robot.mass))
+    usual = LIMIT_SHARE * BASE_TORQUE * float(np.sum(robot.mass))
     slower = LEG_S * math.sqrt(float(np.max(asked[:3])) / usual)
     return _mission(robot, points, max(leg, min(math.ceil(slower), LONGEST_LEG_S)))
 

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from space_robot_control.controller.settings import OF_THE_SET
+from space_robot_control.controller.settings import SET_FILE
 
 from ..campaign.gain_set import write_set
 from ..campaign.study import Law, Study
@@ -63,7 +63,8 @@ class Recommendation:
             return "No law flies this mission with these sensors and actuators."
         criterion = CRITERIA[self.options.criterion]
         best = self.order[0]
-        text = f"Fly {best.law}: of {len(self.flown)} laws it has the least {criterion.text}"
+        reason = f"of {len(self.flown)} laws it has" if len(self.flown) > 1 else "no other can;"
+        text = f"Fly {best.law}: {reason} the least {criterion.text}"
         text += f" ({best.median(criterion.value):.3g} in the median of {len(best.flights)} draws)"
         if not self.compared:
             return f"{text}."
@@ -95,7 +96,7 @@ class Recommendation:
         files = []
         for tuned in sorted((folder / TUNED_SET).glob("*.yaml")):
             law, searched = tuned.stem, folder / tuned.stem / tuned.name
-            if tuned.name == OF_THE_SET:
+            if tuned.name == SET_FILE:
                 continue
             if law == self.law or (law in own and not has_estimate(law)):
                 files.append(searched)
@@ -103,7 +104,7 @@ class Recommendation:
                 files.append(tuned)
             elif own.get(law) == own[self.law]:
                 files.append(searched)
-        return install(files, set_folder / OF_THE_SET, self.law, gains)
+        return install(files, set_folder / SET_FILE, self.law, gains)
 
 
 def recommend(

@@ -19,7 +19,7 @@ from space_robot_msgs_py.errors import InputError
 
 ROBOT_FILE = f"{ROBOT_STEM}.yaml"
 HEAD = "# Made by `{command}`.\n"
-OF_URDF = """\
+URDF_REMARKS = """\
 # What URDF cannot say goes here:
 #   passive: {hinge: {stiffness: 120.0, damping: 0.3}}   springs instead of motors
 #   tools: [left_hand, right_hand]                       links whose frames are end effectors
@@ -86,7 +86,7 @@ def robot_texts(
     robot.pop("urdf_text", None)
     name = f"{source.stem}.urdf"
     return {
-        ROBOT_FILE: head + OF_URDF + _dumped({"robot": {"urdf": name, **robot}}),
+        ROBOT_FILE: head + URDF_REMARKS + _dumped({"robot": {"urdf": name, **robot}}),
         name: with_absolute_meshes(urdf.text, source.absolute().parent),
     }, read
 

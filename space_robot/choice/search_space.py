@@ -169,7 +169,7 @@ class SearchSpace:
         self._known = {name: np.zeros(count) for name in ("coulomb", "viscous", "dead_band")}
         self._known["coulomb"][BASE_AXES:], self._known["viscous"][BASE_AXES:] = friction.T
         self._known["dead_band"][BASE_AXES:] = DEAD_BAND_RATE
-        factors = KNOWN.get(law.name) or _of_each_gain(law, start.gains)
+        factors = KNOWN.get(law.name) or _factor_per_gain(law, start.gains)
         parts = {BASE: slice(0, BASE_AXES)} if controls_base else {}
         parts |= {JOINTS: slice(BASE_AXES, None)}
         self.coordinates: list[Coordinate] = []
@@ -190,8 +190,8 @@ class SearchSpace:
                         start.gains[name][:] *= (bandwidth / start.bandwidth) ** power
                     continue
                 low, high = (w / start.bandwidth for w in (SLOWEST_RAD_S, FASTEST_RAD_S))
-            of_parts = {"": slice(None)} if factor.is_common else parts
-            for part, axes in of_parts.items():
+            own_parts = {"": slice(None)} if factor.is_common else parts
+            for part, axes in own_parts.items():
                 if factor.is_low_pass:
                     fastest = float(max(np.max(start.gains[name][axes]) for name in powers))
                     low, high = (2.0 * np.pi * hz / fastest for hz in (SLOWEST_HZ, FASTEST_HZ))
@@ -271,7 +271,7 @@ def _fast_integral(gains: Mapping[str, Array]) -> Array:
     return gains["lambda"] ** 2
 
 
-def _of_each_gain(law: type[ControlLaw], gains: Mapping[str, Array]) -> list[Factor]:
+def _factor_per_gain(law: type[ControlLaw], gains: Mapping[str, Array]) -> list[Factor]:
     """Return a factor on each gain of a user's law, within the range that it declares."""
     factors = []
     for name, values in gains.items():

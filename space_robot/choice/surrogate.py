@@ -30,7 +30,7 @@ LENGTHS, NOISE = (0.05, 20.0), (1e-6, 0.1)
 values')."""
 OWN_LENGTH, OTHER_LENGTH = 0.4, 4.0
 """First length scales, of gains of the same axes or all, and of the other axes."""
-OF_THE_BASE = ("attitude", "base_torque")
+BASE_METRICS = ("attitude", "base_torque")
 """Beginnings of the names of errors and torques that are the base's."""
 SATURATION_WEIGHT, BEYOND, FAILED = 20.0, 3.0, 1.0
 """What is added to logarithms: of the base's ripple by the share of saturation beyond the allowed
@@ -113,7 +113,7 @@ class Surrogates:
         from sklearn.gaussian_process.kernels import ConstantKernel, Matern, WhiteKernel
 
         # gains of the base hardly move the joints, and those of the joints the base
-        others = JOINTS if name.startswith(OF_THE_BASE) else BASE
+        others = JOINTS if name.startswith(BASE_METRICS) else BASE
         lengths = [
             OTHER_LENGTH if name != GROWTH and coordinate.label.startswith(others) else OWN_LENGTH
             for coordinate in self._space.coordinates
@@ -130,6 +130,6 @@ def _value(score: Score, name: str, is_error: bool) -> float:
     if is_error:
         return score.errors[name]
     ripple = score.ripples[name]
-    if name.startswith(OF_THE_BASE):
+    if name.startswith(BASE_METRICS):
         return ripple + SATURATION_WEIGHT * max(0.0, score.saturation - ALLOWED_SATURATION)
     return ripple + BEYOND * (score.beyond + score.held)

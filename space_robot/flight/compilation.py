@@ -50,10 +50,9 @@ def compile_kernels(with_allocation: bool = False) -> None:
     if not (mark := mark_file(MARK)).exists():
         _compile_flights()
         mark.touch()
-    if with_allocation and not (mark := mark_file(ALLOCATION_MARK)).exists():
+    if with_allocation and not mark_file(ALLOCATION_MARK).exists():
         with compiling("the allocation", allocate):
-            allocation_code(is_used=True)
-        mark.touch()
+            _compile_allocation()
 
 
 def compile_lanes() -> None:
@@ -66,8 +65,13 @@ def compile_lanes() -> None:
 
 def compile_all() -> None:
     """Compile all kernels of flights, also those of a base with hardware."""
-    compile_kernels(with_allocation=True)
-    compile_lanes()
+    compile_kernels()
+    if mark_file(ALLOCATION_MARK).exists():
+        compile_lanes()
+        return
+    with child_process(module_command(__name__, "allocation"), stdout=subprocess.DEVNULL) as helper:
+        compile_lanes()
+        helper.wait()
 
 
 def load_kernels() -> None:
@@ -124,6 +128,11 @@ def _compile_flights() -> None:
             simulate(Flight(resolve(Scenario(controller=law, duration=0.002))))
         _step_plant(Flight(resolve(Scenario())))
         _answer_under_every_law()
+
+
+def _compile_allocation() -> None:
+    allocation_code(is_used=True)
+    mark_file(ALLOCATION_MARK).touch()
 
 
 def _step_plant(flight: Flight) -> None:
@@ -206,4 +215,8 @@ def _compile_controllers_in_lanes() -> None:
 
 if __name__ == "__main__":
     hold_to_standard_input()
-    {"answers": _answer_under_every_law, "plants": _compile_plants_in_lanes}[sys.argv[1]]()
+    {
+        "allocation": _compile_allocation,
+        "answers": _answer_under_every_law,
+        "plants": _compile_plants_in_lanes,
+    }[sys.argv[1]]()

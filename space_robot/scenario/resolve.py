@@ -8,7 +8,7 @@ from dataclasses import replace
 from space_robot_control.allocation.settings import assumed_actuators
 from space_robot_control.controller.gains import Laws
 from space_robot_control.controller.law_choice import NoLaw, parse_swaps
-from space_robot_control.controller.settings import OF_THE_SET
+from space_robot_control.controller.settings import SET_FILE
 from space_robot_control.guidance.mission import Mission
 from space_robot_control.laws import ControlLaw
 from space_robot_control.laws import laws as known_laws
@@ -115,7 +115,7 @@ def flight_laws(scenario: Scenario, settings: FlightSettings) -> Mapping[str, Co
     own = resolve_law(scenario.controller)
     with explained_by("gains"):
         if not scenario.has_chosen_law:  # a robot's folder runs no code by naming it
-            one_of(settings.controller.controller, known_laws(), "controller", f" of {OF_THE_SET}")
+            one_of(settings.controller.controller, known_laws(), "controller", f" of {SET_FILE}")
         return Laws(settings.controller, axes, settings.gains, own or "")
 
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from space_robot_control.controller.gains import NOMINAL_H_BAR as IN_FILES
-from space_robot_control.controller.settings import OF_THE_SET
+from space_robot_control.controller.settings import SET_FILE
 
 from .law_gains import TunedLaw
 from .method import Tuned
@@ -44,7 +44,7 @@ def gain_files(tuned: Tuned, command: str) -> Mapping[str, str]:
         f"{name}.yaml": gain_text([*head, NOTES[name], *_numbers(tuned, law)], name, law.gains)
         for name, law in tuned.laws.items()
     }
-    files[OF_THE_SET] = set_text(
+    files[SET_FILE] = set_text(
         [*head, "Low-pass of the time-delay estimate, part of the set's margin."], tuned.corner_hz
     )
     return files
@@ -94,7 +94,7 @@ def _numbers(tuned: Tuned, law: TunedLaw) -> Sequence[str]:
 
 
 def set_text(comments: Sequence[str], corner_hz: float) -> str:
-    """Return the text of a set's `OF_THE_SET`; ``corner_hz`` of the estimate's low-pass."""
+    """Return the text of a set's `SET_FILE`; ``corner_hz`` of the estimate's low-pass."""
     return "\n".join(
         [
             *_comments(comments),

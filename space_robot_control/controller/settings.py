@@ -21,7 +21,7 @@ from space_robot_msgs_py.errors import InputError
 from ..allocation.settings import AllocationSettings
 from ..navigation.settings import NavigationFilterSettings, NavigationMode, completed
 
-OF_THE_SET = "controller.yaml"
+SET_FILE = "controller.yaml"
 """A file of a gain set with the controller's parameters that belong to its gains; need not be."""
 DEFAULT, DEFAULT_SETS, OTHERS = "default", "default_sets.yaml", "others"
 """The set that is flown unless another is named, and the file of a robot's gains that says for a
@@ -58,7 +58,7 @@ def gain_files(robot: str, gain_set: str) -> dict[str, Path]:
 
 
 def set_file(robot: str, gain_set: str) -> list[Path]:
-    """Return the `OF_THE_SET` of a gain set as `gain_files` takes it, if it has one.
+    """Return the `SET_FILE` of a gain set as `gain_files` takes it, if it has one.
 
     The default set has one if it is the same set for all laws.
     """
@@ -72,7 +72,7 @@ def set_file(robot: str, gain_set: str) -> list[Path]:
         folder = folder / names.pop()
     elif "/" not in gain_set:
         folder = folder / gain_set
-    file = folder / OF_THE_SET
+    file = folder / SET_FILE
     return [file] if is_folder(folder) and file.is_file() else []
 
 
@@ -100,7 +100,7 @@ def _sets(folder: Path) -> list[str]:
 
 def _files(folder: Path) -> dict[str, Path]:
     files = sorted(folder.glob("*.yaml")) if is_folder(folder) else []
-    gains = {file.stem: file for file in files if file.name != OF_THE_SET}
+    gains = {file.stem: file for file in files if file.name != SET_FILE}
     if not gains:
         raise InputError(f"{short(str(folder))}: no folder with gain files (<law>.yaml)")
     return gains

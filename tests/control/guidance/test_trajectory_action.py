@@ -33,7 +33,7 @@ from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint  # noqa: E
 
 pytestmark = pytest.mark.docs  # to build the package takes longer than to fly
 Array = np.ndarray[Any, np.dtype[np.float64]]
-TIMEOUT_S = 60.0
+TIMEOUT_S = 240.0
 NAMES = find_robot("paper").joint_names
 HOME = np.radians([0.0, 120.0, 220.0, 0.0, -10.0, 0.0])
 GOAL = np.radians([2.0, 118.0, 221.0, -2.0, -12.0, 1.0])
@@ -102,9 +102,9 @@ def sim(domain: int, *words: str) -> bool:
 
 @pytest.fixture
 def flight(control_msgs: Path, free_domain: int, tmp_path: Path) -> Iterator[subprocess.Popen[str]]:
-    """A paused flight of 7 s, some ticks after its start."""
+    """A paused flight of 5 s, some ticks after its start."""
     paths = [str(control_msgs), os.environ.get("PYTHONPATH", "")]
-    options = ["--duration", "7", "--domain", str(free_domain), "--bag", str(tmp_path / "bag")]
+    options = ["--duration", "5", "--domain", str(free_domain), "--bag", str(tmp_path / "bag")]
     with (
         subprocess.Popen(
             [*COMMAND, "fly", "--paused", *options],

@@ -68,7 +68,7 @@ def test_it_does_not_outlive_a_starter_that_is_killed() -> None:
     assert not helper.is_running()
 
 
-TIMEOUT_S = 120.0
+TIMEOUT_S = 240.0
 
 
 def echo(connection: Connection, descriptors: Sequence[int], server: int) -> None:

@@ -18,7 +18,7 @@ from space_robot.view.live import LiveView, serve
 from space_robot_model.robot.placements import joint_transforms
 from space_robot_msgs_py.bag.reader import read_flight
 
-TIMEOUT_S = 120.0
+TIMEOUT_S = 240.0
 
 
 def test_a_flight_is_shown_as_it_is_in_truth(

@@ -31,7 +31,7 @@ from space_robot_msgs_py.ros.loop import Health, Level  # noqa: E402
 from space_robot_msgs_py.ros.managed_node import Diagnostics  # noqa: E402
 from space_robot_msgs_py.ros.service_calls import ServiceCalls  # noqa: E402
 
-TIMEOUT_S = 30.0
+TIMEOUT_S = 240.0
 REQUESTS = 8  # a client keeps ten answers
 Make = Callable[..., "rclpy.node.Node"]
 

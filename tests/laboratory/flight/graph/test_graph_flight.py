@@ -150,7 +150,7 @@ def test_launched_nodes_get_files_of_their_own(tmp_path: Path) -> None:
 
 # Flights that do not go to their end: no hang, no process, a readable bag, one clear line
 
-TIMEOUT_S = 90.0
+TIMEOUT_S = 240.0
 
 
 class Begun(PausedFlight):

@@ -33,7 +33,7 @@ from std_srvs.srv import Trigger  # noqa: E402
 from space_robot.flight.graph import node_services  # noqa: E402
 from space_robot.flight.graph.node_services import TemporaryNode  # noqa: E402
 
-TIMEOUT_S = 60.0
+TIMEOUT_S = 240.0
 PROGRAM = """
 import os, sys
 

@@ -42,7 +42,7 @@ from space_robot_msgs_py.ros.endpoints import (  # noqa: E402
 WATCHDOGS = ("plant.silence_timeout", "controller.state_timeout", "controller.reference_timeout")
 IMPATIENT = tuple(word for name in WATCHDOGS for word in ("--set", f"{name}=0.3"))
 LONGER_THAN_ANY_WATCHDOG_S = 0.6
-TIMEOUT_S = 60.0
+TIMEOUT_S = 240.0
 SAME = (
     topics.JOINT_STATES,
     topics.BASE_STATE,
