@@ -37,7 +37,7 @@ TRIAL: Mapping[str, Any] = {"case": "1", "sensors": "fine", "navigation": "filte
 CONDITIONS = "friction, sensors fine and navigation filtered"
 HELD_S = 5.0
 """The candidates fly the first leg, and this long after it, s."""
-SHORT = ChoiceOptions(evaluations=64, trial_s=6.0, runs=6, is_short=True)
+SHORT = ChoiceOptions(evaluations=48, trial_s=6.0, runs=6, is_short=True)
 """How the law is chosen: shorter than `space-robot choose` does."""
 
 Array = NDArray[np.float64]

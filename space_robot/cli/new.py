@@ -225,13 +225,8 @@ def new_robot(
     folder = out or Path(files.name)
     check_replaceable(folder, force, texts)
     compile_lanes()
-    options = replace(
-        SHORT,
-        laws=laws or SHORT.laws,
-        evaluations=evaluations,
-        runs=runs,
-        workers=cores() if workers is None else workers,
-    )
+    workers = cores() if workers is None else workers
+    options = replace(SHORT, laws=laws, evaluations=evaluations, runs=runs, workers=workers)
     made = make_robot(texts, read, folder, command, options)
     said = f"made {folder}/: `space-robot fly --robot {folder}/` flies it"
     if made.choice.law:

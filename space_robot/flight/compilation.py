@@ -65,13 +65,8 @@ def compile_lanes() -> None:
 
 def compile_all() -> None:
     """Compile all kernels of flights, also those of a base with hardware."""
-    compile_kernels()
-    if mark_file(ALLOCATION_MARK).exists():
-        compile_lanes()
-        return
-    with child_process(module_command(__name__, "allocation"), stdout=subprocess.DEVNULL) as helper:
-        compile_lanes()
-        helper.wait()
+    compile_lanes()
+    compile_kernels(with_allocation=True)
 
 
 def load_kernels() -> None:
@@ -193,6 +188,7 @@ def _compile_plants_in_lanes() -> None:
     records = record_type(layout, WIDTH), block_type(layout, 1)
     advance.compile((*records, array_of_lanes(2), array_of_lanes(1), *numbers, MASK))
     measure.compile((block_type(layout, WIDTH), *numbers))
+    _compile_allocation()  # else the other process would be the last to end
 
 
 def _compile_controllers_in_lanes() -> None:
@@ -215,8 +211,4 @@ def _compile_controllers_in_lanes() -> None:
 
 if __name__ == "__main__":
     hold_to_standard_input()
-    {
-        "allocation": _compile_allocation,
-        "answers": _answer_under_every_law,
-        "plants": _compile_plants_in_lanes,
-    }[sys.argv[1]]()
+    {"answers": _answer_under_every_law, "plants": _compile_plants_in_lanes}[sys.argv[1]]()

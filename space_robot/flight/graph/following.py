@@ -29,10 +29,7 @@ STALL_TIMEOUT_S = 60.0
 LISTENER_TIMEOUT_S = 5.0
 """Longest wait of a restarted controller for its listeners, s."""
 HUNG_REPORTS = 5
-"""Reports of the plant without one of the controller, after which that one counts as hung.
-
-Each reports every second. A busy machine delays both, so nothing is measured by the wall clock.
-"""
+"""Reports of the plant, one a second, without one of a controller that then counts as hung."""
 MOST_RESTARTS = 20
 MISSION_FAULTS = frozenset({"kill_mission", "stop_mission"})
 NOT_USED = "rejected: reference: "

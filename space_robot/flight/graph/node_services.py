@@ -248,21 +248,19 @@ def _plant_domain(namespace: str) -> int:
 
 
 def _wait_for(node: Any, service: str, domain: int) -> Check:
-    name = service.rpartition("/")[0]
-    lock = node_lock(domain, node.resolve_service_name(name))
+    owner = service.rpartition("/")[0]
+    lock = node_lock(domain, node.resolve_service_name(owner))
     begun = time.monotonic()
     while not node.count_services(service):
         # one that lives on this machine is found in the end, however busy that is
         if time.monotonic() - begun > (TIMEOUT_S if is_held(lock) else FIND_S):
-            full_name = node.resolve_service_name(service)
-            raise InputError(
-                f"no service {full_name} in ROS domain {domain}: is a graph flying there?"
-            )
+            name = node.resolve_service_name(service)
+            raise InputError(f"no service {name} in ROS domain {domain}: is a graph flying there?")
         time.sleep(POLL_S)
     is_here = is_held(lock)  # on this machine: discovery lists a killed node for another 20 s
 
     def check() -> None:
         if not node.count_services(service) or (is_here and not is_held(lock)):
-            raise FlightError(f"{name} has gone")
+            raise FlightError(f"{owner} has gone")
 
     return check

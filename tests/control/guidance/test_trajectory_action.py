@@ -102,9 +102,9 @@ def sim(domain: int, *words: str) -> bool:
 
 @pytest.fixture
 def flight(control_msgs: Path, free_domain: int, tmp_path: Path) -> Iterator[subprocess.Popen[str]]:
-    """A paused flight of 5 s, some ticks after its start."""
+    """A paused flight of 7 s, some ticks after its start."""
     paths = [str(control_msgs), os.environ.get("PYTHONPATH", "")]
-    options = ["--duration", "5", "--domain", str(free_domain), "--bag", str(tmp_path / "bag")]
+    options = ["--duration", "7", "--domain", str(free_domain), "--bag", str(tmp_path / "bag")]
     with (
         subprocess.Popen(
             [*COMMAND, "fly", "--paused", *options],
