@@ -45,7 +45,7 @@ USES = {
 }
 """Extras for users, and what needs them."""
 GIGABYTE = 1 << 30
-"""Memory to compile kernels and fly a graph; disk for some flights of 30 s, 30 MB each."""
+"""Memory to compile kernels and fly a graph."""
 CLOCK_PERIOD_S, CLOCK_S = 0.0005, 2.0
 """Period of the paper's controller, which the wall clock is tried with, and for how long."""
 POLICIES = {os.SCHED_OTHER: "SCHED_OTHER", os.SCHED_FIFO: "SCHED_FIFO", os.SCHED_RR: "SCHED_RR"}
@@ -90,7 +90,6 @@ def examine() -> Iterator[CheckedItem]:
     yield check_kernels()
     yield check_processor()
     yield check_memory()
-    yield check_disk(Path.cwd())
     yield check_deadlines(measure_lateness())
     yield from check_ros()
     yield from check_tools()
@@ -211,15 +210,6 @@ def check_memory(table: Path = Path("/proc/meminfo")) -> CheckedItem:
     return judged("memory", text, advice if available < GIGABYTE else "", values)
 
 
-def check_disk(folder: Path) -> CheckedItem:
-    """Check the free space where bags would be recorded."""
-    free = shutil.disk_usage(folder).free
-    advice = "free some space, or record elsewhere with --bag: 30 s of flight make about 30 MB"
-    values = {"folder": str(folder), "free_bytes": free}
-    text = f"{free / 1e9:.1f} GB free in {folder}"
-    return judged("disk", text, advice if free < GIGABYTE else "", values)
-
-
 def measure_lateness() -> dict[str, Any]:
     """Wait for deadlines as the plant node does by the wall clock; return how late they end, s."""
     import numpy as np
@@ -338,19 +328,8 @@ def check_domain(number: int | None = None) -> CheckedItem:
 
 
 def check_tools(search_path: str | None = None) -> Iterator[CheckedItem]:
-    """Check compilers, cross compilers with emulators, and browser; None: those of ``PATH``."""
-    from .export.folder import CROSS, EMULATORS
-
+    """Check compilers and browser; ``search_path``: None: ``PATH``."""
     yield _check_compilers(search_path)
-    for processor, compiler in CROSS.items():
-        name, emulator = f"C for {processor}", EMULATORS[processor]
-        paths = {tool: shutil.which(tool, path=search_path) for tool in (compiler, emulator)}
-        package = {compiler: f"gcc-{compiler.removesuffix('-gcc')}", emulator: "qemu-user"}
-        lacking = [tool for tool, path in paths.items() if not path]
-        needed = " ".join(package[tool] for tool in lacking)
-        advice = f"sudo apt install {needed}, if you need export for this processor"
-        text = f"no {' and no '.join(lacking)}" if lacking else f"{compiler}, {emulator}"
-        yield judged(name, text, advice if lacking else "", paths, "missing")
     path = next(filter(None, (shutil.which(name, path=search_path) for name in BROWSERS)), None)
     text = path or f"no browser is installed: one of {', '.join(BROWSERS)} is needed"
     advice = "install Chromium, if you need pictures of view; its pages open in any browser"

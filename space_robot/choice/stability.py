@@ -23,13 +23,14 @@ POSTURES = 6
 class SmallMotions:
     """Those of the robot of one flight, with viscous friction."""
 
-    def __init__(self, flight: Flight, gain: float, friction: float) -> None:
+    def __init__(self, flight: Flight, gain: float, friction: float, is_late: bool) -> None:
         """Compute the motions in some postures.
 
         Args:
             flight: the nominal one.
             gain: factor on the actual torque up to which the loop has to be stable.
             friction: share of the nominal friction.
+            is_late: whether it has to be so with commands a tick late, too.
         """
         robots, mission = flight.scenario.robots, flight.mission_settings
         duration = Mission(robots.controller, mission, flight.period).duration
@@ -39,10 +40,10 @@ class SmallMotions:
         known = coefficients(robots.controller, flight.plant_settings.friction)[:, 1]
         self._damping = np.zeros(self._inertia.shape[-1])
         self._damping[-robots.controller.n :] = friction * known[: robots.controller.n]
-        self._gain, self._settings = gain, flight.controller_settings
+        self._gain, self._is_late, self._settings = gain, is_late, flight.controller_settings
 
     def growth(self, law: ControlLaw, corner_hz: float) -> float:
-        """Return by how much the fastest one grows, 1/s, also with more torque than commanded.
+        """Return by how much the fastest one grows, 1/s, also with more torque, and late.
 
         Args:
             law: with its gains.
@@ -54,5 +55,5 @@ class SmallMotions:
         linear = linear_laws(law, self._postures)
         sets = len(self._inertia) // len(linear)
         loop = RigidLoop(self._inertia, self._postures * sets, linear * sets, weight, self._damping)
-        fastest = max(loop.radius(), loop.radius(actual=self._gain))
+        fastest = max(loop.radius(), loop.radius(1.0, self._gain, self._is_late))
         return (fastest - 1.0 - SLOWEST_GROWTH) / law.period

@@ -64,8 +64,8 @@ class Uncertainty:
 
     @property
     def gain(self) -> float:
-        """Largest factor on the loop gain: by masses, torque, and a delay as one of the rates."""
-        return (1.0 + self.torque_scale) / (1.0 - self.mass) * (1.0 + self.latency_ticks)
+        """Largest factor on the loop gain: by masses and torque, and by a delay beyond one tick."""
+        return (1.0 + self.torque_scale) / (1.0 - self.mass) * max(1.0, self.latency_ticks)
 
     def vary(self, own_friction: bool) -> dict[str, Any]:
         """Return the same as distributions of a campaign.
@@ -150,9 +150,8 @@ class Trials:
         self.law = self.nominal.resolved.law
         self._torques, self._criterion = torques, criterion
         self._variations = [self._variation(deviation) for deviation in uncertainty.deviations]
-        self._small = SmallMotions(
-            Flight(self.nominal.resolved), uncertainty.gain, 1.0 - uncertainty.friction
-        )
+        flight, is_late = Flight(self.nominal.resolved), uncertainty.latency_ticks > 0
+        self._small = SmallMotions(flight, uncertainty.gain, 1.0 - uncertainty.friction, is_late)
 
     def fly(self, points: Sequence[GainPoint]) -> list[Score]:
         """Fly the trials of several gain sets in lanes, and score each.

@@ -81,7 +81,12 @@ class LinearLoop(NamedTuple):
 
 
 def linear_loop(
-    motion: SmallMotion, law: LinearLaw, weight: float, reported: float = 1.0, actual: float = 1.0
+    motion: SmallMotion,
+    law: LinearLaw,
+    weight: float,
+    reported: float = 1.0,
+    actual: float = 1.0,
+    is_late: bool = False,
 ) -> LinearLoop:
     """Return the closed loop of a law.
 
@@ -91,15 +96,18 @@ def linear_loop(
         weight: w of the low-pass of the time-delay pair; 1: none.
         reported: b, ratio of reported to commanded torque.
         actual: ratio of actual to commanded torque.
+        is_late: whether a command acts, and is reported, a tick later.
     """
     rate = motion.rate
     axes, count = rate.shape
     has_estimate = law.estimate is not None and law.uses("n_hat")
+    has_force = has_estimate or law.uses("applied_force") or is_late
     parts = _parts(
         {
             "robot": 2 * count,
             "law": len(law.step),
-            "force": axes if has_estimate or law.uses("applied_force") else 0,
+            "force": axes if has_force else 0,
+            "late_force": axes if is_late else 0,
             "n_hat": axes if has_estimate else 0,
             "last_rate": axes if has_estimate else 0,
             "error_noise": axes,
@@ -112,20 +120,24 @@ def linear_loop(
     r = np.hstack([none, rate]) @ parts["robot"]
     noisy, pair_rate = r + parts["rate_noise"], r + parts["pair_noise"]
     signals = {"error": e, "error_rate": -noisy, "rho": -e, "rho_rate": noisy}
-    if len(parts["force"]):
-        signals["applied_force"] = reported * parts["force"]
+    applied = parts["late_force"] if is_late else parts["force"]
+    if has_force:
+        signals["applied_force"] = reported * applied
     if has_estimate:
         assert law.estimate is not None
         acceleration = (pair_rate - parts["last_rate"]) / law.period
-        pair = reported * parts["force"] - law.estimate @ acceleration
+        pair = reported * applied - law.estimate @ acceleration
         signals["n_hat"] = parts["n_hat"] + weight * (pair - parts["n_hat"])
     states, force = law.step @ parts["law"], law.force_by_state @ parts["law"]
     for name, value in signals.items():
         states = states + law.state_by[name] @ value
         force = force + law.force_by[name] @ value
-    rows = [motion.step @ parts["robot"] + actual * motion.by_force @ force, states]
-    if len(parts["force"]):
+    acting = parts["force"] if is_late else force
+    rows = [motion.step @ parts["robot"] + actual * motion.by_force @ acting, states]
+    if has_force:
         rows.append(force)
+    if is_late:
+        rows.append(parts["force"])
     if has_estimate:
         rows += [signals["n_hat"], pair_rate]
     whole, size = np.vstack(rows), force.shape[1] - 3 * axes
@@ -171,11 +183,10 @@ class RigidLoop:
         self._parts = list(zip(motions, laws, strict=True))
         self._weight = weight
 
-    def radius(self, reported: float = 1.0, actual: float = 1.0) -> float:
-        """Return the largest growth in a tick, with torque scales as in `linear_loop`."""
-        return max(
-            growth(linear_loop(*part, self._weight, reported, actual).step) for part in self._parts
-        )
+    def radius(self, reported: float = 1.0, actual: float = 1.0, is_late: bool = False) -> float:
+        """Return the largest growth in a tick, with torque and delay as in `linear_loop`."""
+        how = self._weight, reported, actual, is_late
+        return max(growth(linear_loop(*part, *how).step) for part in self._parts)
 
     def is_stable(self, reported: float = 1.0, actual: float = 1.0) -> bool:
         """Return True if no small motion grows."""

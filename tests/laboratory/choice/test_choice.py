@@ -72,7 +72,7 @@ def test_motions_grow_at_other_gains_than_those_tuned_and_viscous_friction_damps
     flight = Flight(resolve(Scenario(controller="pd", gains="tuned")))
     tuned = flight.law.gain_values
     integral = {**tuned, "k_i": 0.6 * tuned["k_p"] ** 2 / tuned["k_d"]}
-    free, damped = SmallMotions(flight, 1.0, 0.0), SmallMotions(flight, 1.0, 1.0)
+    free, damped = (SmallMotions(flight, 1.0, share, False) for share in (0.0, 1.0))
     laws = [type(flight.law)(gains, flight.period) for gains in (tuned, integral)]
     checked = [
         check_gains(law, inertia_along(flight.robot, flight.mission_settings, 1.0), postures)

@@ -12,7 +12,6 @@ from flights import space_robot as started
 from space_robot.doctor import (
     CheckedItem,
     check_deadlines,
-    check_disk,
     check_distribution,
     check_domain,
     check_kernels,
@@ -72,16 +71,13 @@ def test_a_missing_package_is_named_with_the_command_that_installs_it() -> None:
     assert "pip install -e ." in required.advice
 
 
-def test_memory_and_disk(tmp_path: Path) -> None:
+def test_memory(tmp_path: Path) -> None:
     table = tmp_path / "meminfo"
     for available_kb, status in ((4_000_000, "ok"), (400_000, "warning")):
         table.write_text(f"MemTotal: 8000000 kB\nMemAvailable: {available_kb} kB\nHugePages: 0\n")
         item = check_memory(table)
         assert item.status == status
         assert item.values["available_bytes"] == 1024 * available_kb
-    item = check_disk(tmp_path)
-    assert str(tmp_path) in item.text
-    assert item.status == ("ok" if item.values["free_bytes"] >= 1 << 30 else "warning")
 
 
 def test_kernels(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -125,13 +121,11 @@ def test_tools(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     lacking = list(check_tools(str(tmp_path)))
     assert {item.status for item in lacking} == {"missing"}
     assert not any(item.prevents_flights for item in lacking)
-    assert "gcc-aarch64-linux-gnu qemu-user" in named(lacking, "C for aarch64").advice
-    for name in ("gcc", "make", "aarch64-linux-gnu-gcc", "chromium"):
+    for name in ("gcc", "make", "chromium"):
         (tmp_path / name).write_text("#!/bin/sh\necho gcc 99.1\necho more\n")
         (tmp_path / name).chmod(0o755)
     items = list(check_tools(str(tmp_path)))
     assert named(items, "C compiler").values == {"gcc": "gcc 99.1"}
-    assert named(items, "C for aarch64").advice.startswith("sudo apt install qemu-user,")
     assert named(items, "browser").text == str(tmp_path / "chromium")
     monkeypatch.setenv("CC", "icc")
     assert named(list(check_tools(str(tmp_path))), "C compiler").text == "CC=icc is not there"
@@ -177,8 +171,7 @@ def test_the_domain_is_that_of_ros_domain_id_or_a_free_one(
 
 NAMES = (
     *("Python", "packages", "extra ros", "extra campaign", "extra view", "flights", "kernels"),
-    *("processor", "memory", "disk", "wall clock", "ROS 2", "C compiler", "C for aarch64"),
-    "browser",
+    *("processor", "memory", "wall clock", "ROS 2", "C compiler", "browser"),
 )
 
 

@@ -82,23 +82,25 @@ def corner(weight: float) -> float:
     return 0.0 if weight == 1.0 else float(-np.log(1.0 - weight) / (2.0 * np.pi * PERIOD))
 
 
-def test_a_loop_of_noise_is_the_recursion_of_the_law() -> None:
+@pytest.mark.parametrize("is_late", [False, True])
+def test_a_loop_of_noise_is_the_recursion_of_the_law(is_late: bool) -> None:
     """PD of one rigid axis, all by hand: noise of e and r enters the force and moves the robot."""
     posture = postures_along(flight().robot, flight().mission_settings, 30.0)[0]
     law = find_law("pd")({"k_p": np.full(9, 40.0), "k_d": np.full(9, 6.0)}, PERIOD)
     inertia = np.diag(np.arange(1.0, 10.0))
     (linear,) = linear_laws(law, [posture])
-    loop = linear_loop(rigid_motion(inertia, posture, PERIOD), linear, 1.0)
-    rng, state = np.random.default_rng(0), np.zeros(18)
+    loop = linear_loop(rigid_motion(inertia, posture, PERIOD), linear, 1.0, is_late=is_late)
+    rng, state, last = np.random.default_rng(0), np.zeros(36 if is_late else 18), np.zeros(9)
     p, r = np.zeros(9), np.zeros(9)
     for _ in range(100):
         noise = rng.normal(size=27)
         force = 40.0 * (noise[:9] - p) - 6.0 * (r + noise[9:18])
         np.testing.assert_allclose(loop.force @ state + loop.force_by_noise @ noise, force)
         state = loop.step @ state + loop.by_noise @ noise
-        acceleration = force / np.diag(inertia)
+        acceleration = (last if is_late else force) / np.diag(inertia)
         p, r = p + PERIOD * r + 0.5 * PERIOD**2 * acceleration, r + PERIOD * acceleration
-        np.testing.assert_allclose(state, np.concatenate([p, r]), atol=1e-12)
+        np.testing.assert_allclose(state[:18], np.concatenate([p, r]), atol=1e-12)
+        last = force
 
 
 def checked(law: str, gains: str) -> GainCheck:
