@@ -8,8 +8,8 @@ CONSTRAINTS := constraints.txt
 CONSTRAINED := campaign dask dist docs gym mpc mutation notebooks parquet ros test view xacro
 PACKAGES := space_robot space_robot_control space_robot_model space_robot_msgs_py space_robot_sim
 # A file's tests run in one process; tests/conftest.py has the files in an order that fills all.
-# Two processes more than there are cores: graphs of nodes wait for one another.
-WORKERS := $(shell echo $$(($$(getconf _NPROCESSORS_ONLN) + 2)))
+# One process more than there are cores: graphs of nodes wait for one another.
+WORKERS := $(shell echo $$(($$(getconf _NPROCESSORS_ONLN) + 1)))
 PYTEST := $(VENV)/bin/python -m pytest --numprocesses $(WORKERS) --maxprocesses 4 --dist loadfile --no-loadscope-reorder
 # Tests of kernels that are short enough without a compiler.
 INTERPRETED := $(addprefix tests/,model/dynamics sim/environment model/robot sim/sensors sim/faults \
@@ -66,7 +66,7 @@ test-docs: kernels $(VENV)/.tests
 	$(PYTEST) -m docs $(ARGS)
 
 check:
-	@$(MAKE) --no-print-directory --jobs 2 lint kernels
+	@$(MAKE) --no-print-directory --jobs 2 lint kernels $(VENV)/.collected
 	@$(MAKE) --no-print-directory test
 
 quick: $(VENV)/.tests
@@ -144,6 +144,10 @@ $(VENV)/.tests: setup.py pyproject.toml $(CONSTRAINTS) | $(VENV)/.flies
 	@echo "installing the tests' tools into $(VENV): a minute, once"
 	@$(PIP_INSTALL) --no-compile --editable '.[ros,test]'
 	@touch $@
+
+# Else all test processes would compile the same Python sources.
+$(VENV)/.collected: | $(VENV)/.tests
+	@NUMBA_DISABLE_JIT=1 $(VENV)/bin/python -m pytest --collect-only -qq > $@ 2>&1 || true
 
 $(VENV)/.docs: setup.py $(CONSTRAINTS) | $(VENV)/.made
 	@echo "installing space_robot and what makes its site into $(VENV): a minute, once"

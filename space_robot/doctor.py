@@ -50,7 +50,6 @@ CLOCK_PERIOD_S, CLOCK_S = 0.0005, 2.0
 """Period of the paper's controller, which the wall clock is tried with, and for how long."""
 POLICIES = {os.SCHED_OTHER: "SCHED_OTHER", os.SCHED_FIFO: "SCHED_FIFO", os.SCHED_RR: "SCHED_RR"}
 COMPILER_TIMEOUT_S = 5.0
-BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome")
 
 
 class CheckedItem(NamedTuple):
@@ -92,7 +91,7 @@ def examine() -> Iterator[CheckedItem]:
     yield check_memory()
     yield check_deadlines(measure_lateness())
     yield from check_ros()
-    yield from check_tools()
+    yield check_compilers()
 
 
 def check_python(python: tuple[int, int] = sys.version_info[:2]) -> CheckedItem:
@@ -327,16 +326,8 @@ def check_domain(number: int | None = None) -> CheckedItem:
     return judged("ROS domain", text, "" if is_empty else advice, values)
 
 
-def check_tools(search_path: str | None = None) -> Iterator[CheckedItem]:
-    """Check compilers and browser; ``search_path``: None: ``PATH``."""
-    yield _check_compilers(search_path)
-    path = next(filter(None, (shutil.which(name, path=search_path) for name in BROWSERS)), None)
-    text = path or f"no browser is installed: one of {', '.join(BROWSERS)} is needed"
-    advice = "install Chromium, if you need pictures of view; its pages open in any browser"
-    yield judged("browser", text, "" if path else advice, {"path": path} if path else {}, "missing")
-
-
-def _check_compilers(search_path: str | None) -> CheckedItem:
+def check_compilers(search_path: str | None = None) -> CheckedItem:
+    """Check the compilers of C; ``search_path``: None: ``PATH``."""
     from space_robot_control.flight_code.instances import COMPILERS
 
     own = os.environ.get("CC", "")

@@ -12,7 +12,7 @@ from space_robot_msgs_py.errors import InputError
 from .analysed_log import AnalysedLog
 from .described import NO_LIMITS
 from .errors import joined_error, measured_rows, waypoint_ticks
-from .series import Definition, Limit, TimeSeries, largest_sizes, metrics, series
+from .series import Definition, TimeSeries, largest_sizes, metrics, series
 
 Array = NDArray[np.float64]
 
@@ -76,9 +76,7 @@ def settling(flight: AnalysedLog) -> dict[str, float]:
     "saturation",
     {
         "torque_limits.ticks": Definition("ticks", "ticks with a reported torque at its limit"),
-        "torque_limits.share": Definition(
-            "share", "share of these ticks", limit=Limit("torques at their limit")
-        ),
+        "torque_limits.share": Definition("share", "share of these ticks"),
         "torque_limits.base": Definition("N m", "limit of the base's torque; missing: none"),
         "torque_limits.joints": Definition("N m", "limit of the joints' torques; missing: none"),
     },
@@ -106,11 +104,7 @@ def saturation(flight: AnalysedLog) -> dict[str, float]:
 @metrics(
     "saturation",
     {
-        "wheels.saturation": Definition(
-            "share",
-            "share of the ticks with any wheel at a limit",
-            limit=Limit("wheels at their limit"),
-        ),
+        "wheels.saturation": Definition("share", "share of the ticks with any wheel at a limit"),
         "wheels.saturation_ticks": Definition("ticks", "these ticks"),
         "{wheel}.torque_limit_ticks": Definition("ticks", "ticks at the motor's largest torque"),
         "{wheel}.momentum_limit_ticks": Definition("ticks", "ticks at the largest momentum"),
@@ -182,9 +176,7 @@ def wheel_motion(
     "joints",
     {
         "{joint}.standing": Definition(
-            "share",
-            "share of the way that the joint is to move on which friction holds it",
-            limit=Limit("{} held by friction", LONG_STANDING),
+            "share", "share of the way that the joint is to move on which friction holds it"
         )
     },
 )

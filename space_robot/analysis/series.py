@@ -26,14 +26,6 @@ Array = NDArray[np.float64]
 PLACEHOLDER = re.compile(r"{(\w+)}")
 
 
-class Limit(NamedTuple):
-    """A limit that a flight met if a metric is above a number; reports of campaigns say so."""
-
-    text: str
-    """As in "wheels at their limit"; ``{}`` stands for the place, such as a joint."""
-    above: float = 0.0
-
-
 class Definition(NamedTuple):
     """Unit and meaning of a column of a series, or of a metric."""
 
@@ -45,7 +37,6 @@ class Definition(NamedTuple):
     """The size of a column at a tick is its norm; else its largest absolute value."""
     is_shown: bool = True
     """Whether tables of reports have it; all are in JSON."""
-    limit: Limit | None = None
 
 
 class TimeSeries(NamedTuple):

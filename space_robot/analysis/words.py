@@ -80,7 +80,7 @@ def remarks(report: Report) -> list[str]:
 
 
 def warnings(metrics: Metrics) -> list[str]:
-    """Say what should not be in a flight, a sentence each: limits met, limit cycles."""
+    """Say what should not be in a flight: limits met, limit cycles; each as ``what: where``."""
     return [
         *_saturated_wheels(metrics),
         *_reversing_wheels(metrics),
@@ -134,7 +134,7 @@ def _saturated_wheels(metrics: Metrics) -> Iterator[str]:
     if first := with_statistic(metrics, "first_limit"):
         name = min(first, key=lambda wheel: first[wheel])
         yield (
-            "wheels were at a limit of torque or momentum at "
+            "wheels at a limit of torque or momentum: "
             f"{metrics['wheels.saturation_ticks']:.0f} ticks "
             f"({metrics['wheels.saturation']:.2%}), {name} first at {first[name]:g} s"
         )
@@ -143,7 +143,7 @@ def _saturated_wheels(metrics: Metrics) -> Iterator[str]:
 def _reversing_wheels(metrics: Metrics) -> Iterator[str]:
     rates = with_statistic(metrics, "reversals")
     if often := [f"{name} {rate:.2g}" for name, rate in rates.items() if rate >= OFTEN_REVERSED]:
-        yield f"wheels that change their sense of rotation, times a second: {', '.join(often)}"
+        yield f"wheels that change their sense of rotation: {', '.join(often)} times a second"
 
 
 def limit_cycles(metrics: Metrics) -> Iterator[str]:

@@ -70,7 +70,7 @@ class ChoiceOptions:
     runs: int = 24
     """Draws that every candidate flies."""
     seed: int = 1
-    workers: int = 1
+    workers: int = 0
     uncertainty: Uncertainty = field(default_factory=Uncertainty)
     error: float | None = None
     """If set: the least ripple with at most this error is searched."""

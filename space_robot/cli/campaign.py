@@ -216,7 +216,7 @@ def report(
     study: Path | None,
     as_json: bool,
 ) -> None:
-    """Report a campaign: limits met, requirements, laws, influences, worst runs.
+    """Report a campaign: warnings, requirements, laws, influences, worst runs.
 
     DIR is the folder of `campaign run`, finished or not. docs/manual/campaigns.md explains
     the numbers. Damaged files are listed.

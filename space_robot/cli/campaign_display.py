@@ -66,8 +66,8 @@ def print_summary(flown: FlownCampaign, console: Console) -> None:
     judged = findings.judged
     worst = (findings.worst(findings.whole, judged[0], 1) if judged else flown.table).iloc[0]
     say(console, f"{findings.rerun_command(worst['run'], worst['law'])}    # the worst")
-    for limit in findings.limits:
-        say(console, limit)
+    for warning in findings.flight_warnings:
+        say(console, warning)
 
 
 def medians(table: DataFrame, names: dict[str, str], seed: int, own: Sequence[str] = ()) -> Table:

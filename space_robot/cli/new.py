@@ -226,7 +226,8 @@ def new_robot(
     check_replaceable(folder, force, texts)
     compile_lanes()
     workers = cores() if workers is None else workers
-    options = replace(SHORT, laws=laws, evaluations=evaluations, runs=runs, workers=workers)
+    own = laws or SHORT.laws
+    options = replace(SHORT, laws=own, evaluations=evaluations, runs=runs, workers=workers)
     made = make_robot(texts, read, folder, command, options)
     said = f"made {folder}/: `space-robot fly --robot {folder}/` flies it"
     if made.choice.law:

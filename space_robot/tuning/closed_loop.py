@@ -185,8 +185,8 @@ class RigidLoop:
 
     def radius(self, reported: float = 1.0, actual: float = 1.0, is_late: bool = False) -> float:
         """Return the largest growth in a tick, with torque and delay as in `linear_loop`."""
-        how = self._weight, reported, actual, is_late
-        return max(growth(linear_loop(*part, *how).step) for part in self._parts)
+        loops = (linear_loop(*p, self._weight, reported, actual, is_late) for p in self._parts)
+        return max(growth(loop.step) for loop in loops)
 
     def is_stable(self, reported: float = 1.0, actual: float = 1.0) -> bool:
         """Return True if no small motion grows."""

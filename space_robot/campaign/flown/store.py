@@ -28,7 +28,7 @@ _TABLES = (
     "CREATE TABLE IF NOT EXISTS meta (key TEXT PRIMARY KEY, value TEXT)",
     "CREATE TABLE IF NOT EXISTS flights (run INTEGER, law TEXT, outcome TEXT, reason TEXT, "
     "ended_at_s REAL, vary TEXT, metrics TEXT, require TEXT, band_lengths TEXT, bands BLOB, "
-    "digest TEXT, PRIMARY KEY (run, law))",
+    "warnings TEXT, digest TEXT, PRIMARY KEY (run, law))",
 )
 TRANSIENT_ERRORS = (
     "database is locked",
@@ -94,6 +94,7 @@ class CampaignStore:
             row.ended_at_s,
             *(json.dumps(dict(mapping)) for mapping in mappings),
             b"".join(band.astype("<f4").tobytes() for band in row.bands.values()),
+            row.warnings,
             row.digest,
         )
         with self._named_errors():
@@ -104,7 +105,7 @@ class CampaignStore:
         """Yield all rows, ordered by run."""
         with self._named_errors():
             for values in self._database.execute("SELECT * FROM flights ORDER BY run"):
-                run, law, outcome, reason, ended_at_s, *texts, bands, digest = values
+                run, law, outcome, reason, ended_at_s, *texts, bands, warnings, digest = values
                 try:
                     vary, metrics, require, lengths = map(json.loads, texts)
                     ends = np.cumsum(list(lengths.values()))
@@ -112,8 +113,8 @@ class CampaignStore:
                     by_name = dict(zip(lengths, parts, strict=True))
                 except (ValueError, TypeError) as error:
                     raise sqlite3.DatabaseError(f"run {run} under {law}: {error}") from None
-                numbers = vary, metrics, require, by_name
-                yield Row(Task(run, law), outcome, reason, ended_at_s, *numbers, digest)
+                rest = vary, metrics, require, by_name, warnings, digest
+                yield Row(Task(run, law), outcome, reason, ended_at_s, *rest)
 
     @contextmanager
     def _named_errors(self) -> Iterator[None]:

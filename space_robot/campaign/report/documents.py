@@ -206,7 +206,7 @@ def record(findings: Findings) -> dict[str, Any]:
         "laws": findings.laws,
         "grid": list(findings.grid),
         "about": dict(findings.about),
-        "limits": findings.limits,
+        "warnings": findings.flight_warnings,
         "remarks": findings.remarks,
         "outcomes": {
             law: rows["outcome"].value_counts().to_dict()

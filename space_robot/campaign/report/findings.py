@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import shlex
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -174,27 +175,14 @@ class Findings:
         return [*errors, *(name for name in others if name in known)] or known[:4]
 
     @cached_property
-    def limits(self) -> list[str]:
-        """Return a sentence for each limit that most flights met, under all laws or some."""
+    def flight_warnings(self) -> list[str]:
+        """Return a sentence for each law: in how many complete flights which warning was due."""
         sentences = []
-        law = self.table["law"]
-        for column in (c for c in map(str, self.table) if c.startswith("metric.")):
-            name = column.removeprefix("metric.")
-            if (limit := describe(name).limit) is None:
-                continue
-            share = self.table[column].dropna()
-            counts = (share > limit.above).groupby(law, sort=False).agg(["sum", "count"])
-            often = counts[counts["sum"] > 0.5 * counts["count"]]
-            if often.empty:
-                continue
-            under = ", ".join(self.names[str(each)] for each in often.index)
-            met, flights = often["sum"].sum(), often["count"].sum()
-            usual = share[law.loc[share.index].isin(often.index)].median()
-            sentences.append(
-                f"{limit.text.format(name.rpartition('.')[0])} in {met:,} of {flights:,} flights"
-                f"{f' under {under}' if len(often) < len(counts) else ''} "
-                f"({name}: median {usual:.2g})"
-            )
+        for law, rows in self.table[is_complete(self.table)].groupby("law", sort=False):
+            words = "; ".join(rows.get("warnings", ())).split("; ")
+            kinds = Counter(filter(None, words)).most_common()
+            counts = (f"{kind} in {count:,} of {len(rows):,}" for kind, count in kinds)
+            sentences += [f"{self.names[str(law)]}: {', '.join(counts)} flights"] if kinds else []
         return sentences
 
     @cached_property

@@ -58,8 +58,9 @@ def _titled(*parts: str) -> str:
 
 
 def summary_table(findings: Findings) -> Table:
-    """Tabulate limits that most flights met, verdicts by requirement, and remarks."""
-    rows: list[list[Any]] = [["limit", JudgedCell("", text, "bad")] for text in findings.limits]
+    """Tabulate what flights warn of, verdicts by requirement, and remarks."""
+    warned = findings.flight_warnings
+    rows: list[list[Any]] = [["warning", JudgedCell("", text, "bad")] for text in warned]
     for quantity in findings.required:
         for word in ("met", "not met", "undecided", "not measured"):
             named = [

@@ -20,6 +20,7 @@ from ...analysis.pointing import lacking_for_jitter
 from ...analysis.series import GROUPS, SeriesGroup
 from ...analysis.tool_path import leads_tool
 from ...analysis.torques import lacking_for_ripple
+from ...analysis.words import warnings
 from ...flight.flown_log import empty_log
 from ...flight.plan import Flight
 from ..study import Requirement
@@ -44,6 +45,11 @@ FURTHER = (
 """Further metrics of every row, as far as a flight has them."""
 FURTHER_GROUPS = ("steadiness", "ripple", "settling", "wheel_saturation", "saturation")
 """The groups with these metrics. Every row also has the whole group ``standing``."""
+WARNING_GROUPS = (
+    *("torques", "ripple", "wheel_saturation", "wheel_reversals", "standing"),
+    *("beyond_limits", "effort_used"),
+)
+"""The groups that warnings need."""
 MESSAGE_GROUPS = ("navigation", "saturation", "latency", "commands", "estimate_error")
 """Groups that need more of a flight than its true states: measurements, commands."""
 BINS = 100
@@ -57,6 +63,8 @@ class Measured(NamedTuple):
     require: dict[str, float]
     """The metric of each requirement in its window, by the requirement's name."""
     bands: dict[str, NDArray[np.float32]]
+    warnings: str
+    """See `Row`."""
 
 
 def planned(flight: Flight, budget: PointingBudget | None = None) -> AnalysedLog:
@@ -120,7 +128,9 @@ def measure_row(
     flight = AnalysedLog(log, budget)
     columns, own_by_name = row_columns(flight), {metric.name: metric for metric in own}
     wanted = [m for m in row_metrics(flight, require.values()) if m not in own_by_name]
-    metrics = evaluate(flight, wanted)[0]
+    groups = {*WARNING_GROUPS, *(group.name for m in wanted if (group := metric_group(m)))}
+    known = evaluate(flight, groups=groups)[0]
+    metrics = {name: known[name] for name in wanted if name in known}
     metrics |= {metric.name: metric.value(log) for metric in own}
     values = {}
     for name, demand in require.items():
@@ -139,7 +149,9 @@ def measure_row(
         for start, sizes in group.sizes(flight)
     ]
     bands = largest_in_bins(blocks, ticks)
-    return Measured(_finite(metrics), _finite(values), {name: bands[name] for name in columns})
+    warned = "; ".join(text.partition(":")[0] for text in warnings(known))
+    own_bands = {name: bands[name] for name in columns}
+    return Measured(_finite(metrics), _finite(values), own_bands, warned)
 
 
 def check_requirements(

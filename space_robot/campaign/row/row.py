@@ -49,6 +49,8 @@ class Row:
     require: Mapping[str, float] = field(default_factory=dict)
     """Metric of each requirement in its window."""
     bands: Mapping[str, NDArray[np.float32]] = field(default_factory=dict)
+    warnings: str = ""
+    """What should not be in a complete flight, such as ``limit cycle``, separated by "; "."""
     digest: str = ""
     """Digest from `digested`; empty if the flight was refused, killed or out of time."""
 
@@ -125,4 +127,5 @@ class Columns(StrictModel):
         for name in self.bands:
             bands = [row.bands.get(name) for row in rows]
             table[f"band.{name}"] = pandas.Series(bands, dtype=object)
+        table["warnings"] = [row.warnings for row in rows]
         return pandas.DataFrame(table | {"digest": [row.digest for row in rows]})

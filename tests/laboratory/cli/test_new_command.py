@@ -71,7 +71,7 @@ def test_a_file_becomes_a_folder_that_flies(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     quickly(monkeypatch, "ctc", "pd")
-    result = new(FILE, "--out", "mine", "--evaluations", "1", "--workers", "1", "--json")
+    result = new(FILE, "--out", "mine", "--evaluations", "1", "--workers", "0", "--json")
     assert result.exit_code == 0, result.exception
     assert "made mine/: `space-robot fly --robot mine/` flies it" in result.stderr
     report = json.loads(result.stdout)

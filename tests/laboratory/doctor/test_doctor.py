@@ -11,6 +11,7 @@ from flights import space_robot as started
 
 from space_robot.doctor import (
     CheckedItem,
+    check_compilers,
     check_deadlines,
     check_distribution,
     check_domain,
@@ -19,7 +20,6 @@ from space_robot.doctor import (
     check_middleware,
     check_packages,
     check_python,
-    check_tools,
 )
 from space_robot.flight.graph.domain import ros_domain
 from space_robot_msgs_py.config.installation import requirements
@@ -114,21 +114,18 @@ def test_deadlines_are_kept_if_99_percent_of_the_ticks_are_late_by_less_than_a_p
         assert item.values["percentile_99_s"] == late["percentile_99_s"]
 
 
-def test_tools(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """By their search path; compilers are started for their version."""
+def test_compilers(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """By their search path; they are started for their version."""
     monkeypatch.delenv("CC", raising=False)
     monkeypatch.setenv("PATH", str(tmp_path))
-    lacking = list(check_tools(str(tmp_path)))
-    assert {item.status for item in lacking} == {"missing"}
-    assert not any(item.prevents_flights for item in lacking)
-    for name in ("gcc", "make", "chromium"):
+    lacking = check_compilers(str(tmp_path))
+    assert (lacking.status, lacking.prevents_flights) == ("missing", False)
+    for name in ("gcc", "make"):
         (tmp_path / name).write_text("#!/bin/sh\necho gcc 99.1\necho more\n")
         (tmp_path / name).chmod(0o755)
-    items = list(check_tools(str(tmp_path)))
-    assert named(items, "C compiler").values == {"gcc": "gcc 99.1"}
-    assert named(items, "browser").text == str(tmp_path / "chromium")
+    assert check_compilers(str(tmp_path)).values == {"gcc": "gcc 99.1"}
     monkeypatch.setenv("CC", "icc")
-    assert named(list(check_tools(str(tmp_path))), "C compiler").text == "CC=icc is not there"
+    assert check_compilers(str(tmp_path)).text == "CC=icc is not there"
 
 
 def test_another_distribution_or_middleware_is_a_warning() -> None:
@@ -171,7 +168,7 @@ def test_the_domain_is_that_of_ros_domain_id_or_a_free_one(
 
 NAMES = (
     *("Python", "packages", "extra ros", "extra campaign", "extra view", "flights", "kernels"),
-    *("processor", "memory", "wall clock", "ROS 2", "C compiler", "browser"),
+    *("processor", "memory", "wall clock", "ROS 2", "C compiler"),
 )
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import math
 from collections.abc import Iterator
+from functools import cache
 from importlib import import_module
 from typing import Any, NamedTuple
 
@@ -55,7 +56,12 @@ class Source(NamedTuple):
         return f"{self.file}:{self.tree.lineno} {self.tree.name}"
 
 
-def sources() -> Iterator[Source]:
+@cache
+def kernels() -> list[Source]:
+    return list(_sources())
+
+
+def _sources() -> Iterator[Source]:
     for package in PACKAGES:
         for path in sorted((ROOT / package).rglob("*.py")):
             for node in ast.walk(ast.parse(path.read_text("utf-8"))):
@@ -64,9 +70,6 @@ def sources() -> Iterator[Source]:
                     for d in node.decorator_list
                 ):
                     yield Source(str(path.relative_to(ROOT)), node)
-
-
-KERNELS = list(sources())
 
 
 def uniform_fields() -> set[str]:
@@ -88,13 +91,13 @@ def uniform_fields() -> set[str]:
 
 
 def test_there_are_kernels_to_check() -> None:
-    assert len(KERNELS) > 150
+    assert len(kernels()) > 150
     assert WIDTH == 8
 
 
 @pytest.mark.parametrize("package", PACKAGES)
 def test_functions_of_libraries_are_exact_ones(package: str) -> None:
-    for source in KERNELS:
+    for source in kernels():
         if not source.file.startswith(f"{package}/"):
             continue
         for node in ast.walk(source.tree):
@@ -108,7 +111,7 @@ def _is_annotation(node: ast.Attribute) -> bool:
 
 def test_powers_are_of_constants_or_whole() -> None:
     """``x ** y`` of the C library differs between machines."""
-    for source in KERNELS:
+    for source in kernels():
         for node in ast.walk(source.tree):
             if isinstance(node, ast.BinOp) and isinstance(node.op, ast.Pow):
                 whole = isinstance(node.right, ast.Constant) and node.right.value == 2
@@ -120,7 +123,7 @@ def test_powers_are_of_constants_or_whole() -> None:
 def test_what_is_uniform_is_declared_so() -> None:
     """Flights with different numbers there must not be in one batch."""
     declared, used = uniform_fields(), set[str]()
-    for source in KERNELS:
+    for source in kernels():
         for node in ast.walk(source.tree):
             if isinstance(node, ast.Call) and ast.unparse(node.func) in ("uniform", "whole"):
                 (argument,) = node.args
