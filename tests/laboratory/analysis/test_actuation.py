@@ -137,7 +137,7 @@ def test_wheels_that_reverse_and_efforts_near_a_limit_are_warnings() -> None:
     assert report["warnings"] == analyze(log, in_brief=True)["warnings"] == warnings(metrics)
     said = warnings({"wheel_1.reversals": 1.0, "wheel_2.reversals": 0.9, "a.effort_used": 0.95})
     assert said == [
-        "wheels that change their sense of rotation, times a second: wheel_1 1",
+        "wheels that change their sense of rotation: wheel_1 1 times a second",
         "joints near their limit of effort: a 95%",
     ]
 
@@ -197,7 +197,7 @@ def test_wheels_at_their_limits_are_counted_and_said(paper_robot: Robot) -> None
         "wheel_3.momentum_limit_ticks": 1,
         "wheel_3.first_limit": 0.025,
     }
-    said = "at a limit of torque or momentum at 32 ticks (32.00%), wheel_1 first at 0.005 s"
+    said = "at a limit of torque or momentum: 32 ticks (32.00%), wheel_1 first at 0.005 s"
     brief = analyze(log, in_brief=True)
     assert any(said in text for text in remarks(brief))
     asked = sizing_table(brief)
