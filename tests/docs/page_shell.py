@@ -54,6 +54,8 @@ OF_GRAPHS = re.compile(
 )
 """Commands that need a graph. All other options of `fly` are those of `simulate`, which flies the
 same bits (tests/laboratory/flight/graph holds it to that) and is asked in its place."""
+LOOKING = re.compile(r"(analyze|campaign report|gains check|plan|stability|view) (?!.*--(csv|out))")
+"""Commands whose files no other command reads; pages repeat them."""
 PLACEHOLDERS = {
     "COMMAND": "fly",
     "D": "2",
@@ -196,6 +198,7 @@ class PageShell:
         self._new: dict[str, Path] = {}
         """Folders that `space-robot new` made of the URDF of the documentation, by its options:
         it flies all laws, and pages repeat it."""
+        self._seen: dict[tuple[str, ...], subprocess.CompletedProcess[str]] = {}
 
     def run(self, page: Path) -> list[str]:
         """Run commands and snippets from top to end; return what failed."""
@@ -283,7 +286,14 @@ class PageShell:
         return "", f"space-robot {line}\n(run as {' '.join(command)}): {told}"
 
     def _made_again(self, command: tuple[str, ...]) -> subprocess.CompletedProcess[str] | None:
-        """A copy of a robot's folder made before; the first time it is made for the copies."""
+        """A copy of a robot's folder made before; the first time it is made for the copies.
+
+        What only looks, another page has seen.
+        """
+        if LOOKING.match(" ".join(command)):
+            if command not in self._seen:
+                self._seen[command] = space_robot_here(*command)
+            return self._seen[command]
         if command[:2] != ("new", "my.urdf") or "--help" in command:
             return None
         options = " ".join(command)
