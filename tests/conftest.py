@@ -28,7 +28,7 @@ else:
     settings.load_profile("ci")
 
 from command import Ran, Run
-from flights import Flown, Start, ros_environment, space_robot_here
+from flights import RESERVED, Flown, Start, ros_environment, space_robot_here
 from forked import END_S, Forked
 from paths import CONFIG, TESTS
 
@@ -210,10 +210,10 @@ def fly(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Flown]:
 
 
 @pytest.fixture
-def free_domain() -> int:
-    """Of nobody: a flight will take it."""
-    with ros_domain() as domain:
-        return domain
+def free_domain() -> Iterator[int]:
+    """Of nobody: a flight will take it. None that looks for a free one does."""
+    with ros_domain(namespace=RESERVED) as domain:
+        yield domain
 
 
 @pytest.fixture

@@ -28,6 +28,8 @@ if TYPE_CHECKING:
 Start = Callable[..., Forked]
 """Starts a node with parameters."""
 COMMAND = [sys.executable, "-m", "space_robot.cli.main"]
+RESERVED = "/reserved"
+"""A namespace that a test holds in a domain, so that nobody who looks for a free one takes it."""
 
 
 def ros_environment() -> dict[str, str]:

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from contextlib import closing
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from flights import forked_space_robot, space_robot_here, wait_for_nodes
+from flights import RESERVED, forked_space_robot, space_robot_here, wait_for_nodes
 
 from space_robot.flight.graph.domain import ros_domain
 from space_robot.flight.replay.run import replay
@@ -84,12 +84,15 @@ class Flown:
 
 
 @pytest.fixture(scope="module")
-def flown(tmp_path_factory: pytest.TempPathFactory) -> Flown:
+def flown(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Flown]:
     """Swapped, refused, two gains in two calls, there and back between two looks, and a plan; then
     the controller is killed, and another one takes over."""
     bag = tmp_path_factory.mktemp("changed") / "bag"
-    with ros_domain() as domain:
-        pass  # a free one, for the flight to take
+    with ros_domain(namespace=RESERVED) as domain:
+        yield flown_in(domain, bag)
+
+
+def flown_in(domain: int, bag: Path) -> Flown:
     plan = f"--duration 3 --swap {SWAP_S}:tde_smc --set plant.silence_timeout=0.2 --json".split()
     plan += ["--set", "plant.hold_ticks=100"]
     death = ["--restart-controller", "--fault", f"kill_controller@{KILL_S}"]

@@ -141,10 +141,10 @@ def test_a_taken_port_of_the_domain_is_somebody(
     assert is_quiet(alone)
 
 
-def test_a_domain_with_any_taken_port_is_not_free(
-    alone: int, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_domain_with_any_taken_port_is_not_free(monkeypatch: pytest.MonkeyPatch) -> None:
     """A participant that outlives the first one of its flight has no port 10."""
+    with ros_domain() as alone:
+        pass
     monkeypatch.setattr(domains, "DOMAINS", range(alone, alone + 1))
     with taken(alone, 12), pytest.raises(FlightError, match=f"between {alone} and"), ros_domain():
         pass
