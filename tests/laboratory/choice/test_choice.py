@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 
 import numpy as np
@@ -164,3 +165,23 @@ def test_attitude_counts_as_much_as_all_joints() -> None:
     metrics = {"attitude_angle.rms": 4.0, "joints_1_3.rms": 1.0, "joints_4_6.rms": 16.0}
     error = CRITERIA["tracking"].error({**metrics, "base_torque.rms": 9.0})
     assert error == pytest.approx(4.0)
+
+
+@pytest.mark.parametrize("asked", [("--ripple", "10"), ("--error", "1"), ("--bandwidth", "4")])
+def test_one_law_is_tuned_by_flights_for_what_is_asked(tmp_path: Path, asked: tuple[str]) -> None:
+    words = ("--law", "ctc", "--case", "3", "--evaluations", "3", *asked, "-o", str(tmp_path))
+    result = CliRunner().invoke(cli, ("gains", "tune", *words))
+    assert result.exit_code == 0, result.exception
+    gains = resolve(Scenario(controller="ctc", gains=f"{tmp_path}/")).law.gain_values
+    if "--bandwidth" in asked:
+        np.testing.assert_allclose(gains["k_p"][:3], 16.0)
+    error = float(re.findall(r"error ([\d.e-]+), ripple", result.stderr)[0])
+    assert 0.0 < error < 1.0
+
+
+def test_what_one_law_cannot_reach_is_refused(tmp_path: Path) -> None:
+    words = ("--law", "ctc", "--evaluations", "1", "--error", "1e-12", "-o", str(tmp_path))
+    result = CliRunner().invoke(cli, ("gains", "tune", *words))
+    assert isinstance(result.exception, InputError)
+    assert "law ctc: no gains are as asked" in str(result.exception)
+    assert not [*tmp_path.iterdir()]
