@@ -11,13 +11,12 @@ import os
 import signal
 import sys
 import threading
-import time
 
 FOLDER = os.path.dirname(os.path.abspath(__file__))
 LIFELINE = "SPACE_ROBOT_LIFELINE"
 """Environment variable: the standard input is a lifeline held by the process with this pid."""
 TIMEOUT_S = 15.0
-"""Time from SIGTERM to SIGKILL."""
+"""Time from SIGTERM to SIGALRM."""
 DEFAULTS = {
     # discovery stays on this machine
     "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
@@ -82,16 +81,16 @@ def hold_to_standard_input() -> None:
 
 
 def hold_to(descriptor: int) -> None:
-    """Send this process SIGTERM when the pipe's other end is closed, and later SIGKILL."""
+    """Send this process SIGTERM when the pipe's other end is closed, and later SIGALRM."""
     threading.Thread(target=_wait, args=(descriptor,), name="lifeline", daemon=True).start()
 
 
 def _wait(descriptor: int) -> None:
     while os.read(descriptor, 4096):
         pass
+    # by the kernel: a node that hangs in the middleware may keep all Python threads from running
+    signal.setitimer(signal.ITIMER_REAL, TIMEOUT_S)
     os.kill(os.getpid(), signal.SIGTERM)
-    time.sleep(TIMEOUT_S)
-    os.kill(os.getpid(), signal.SIGKILL)
 
 
 def _main() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ctypes
 import json
 import os
 import signal
@@ -11,6 +12,7 @@ import tempfile
 import time
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import psutil
 import pytest
@@ -85,17 +87,23 @@ def test_a_killed_starter_takes_its_process_with_it(
     starter.communicate()
 
 
-def test_deaf_process_is_killed(monkeypatch: pytest.MonkeyPatch) -> None:
+def hangs(*_: object) -> None:
+    """In C, with Python's lock, so that no other thread of Python goes on."""
+    ctypes.PyDLL(None).sleep(60)
+
+
+@pytest.mark.parametrize("ending", [signal.SIG_IGN, hangs], ids=["deaf", "hanging"])
+def test_process_that_does_not_end_is_killed(monkeypatch: pytest.MonkeyPatch, ending: Any) -> None:
     monkeypatch.setattr(process, "TIMEOUT_S", 0.1)
     pid = os.fork()
     if not pid:
-        signal.signal(signal.SIGTERM, signal.SIG_IGN)
+        signal.signal(signal.SIGTERM, ending)
         read_end, write_end = os.pipe()
         process.hold_to(read_end)
         os.close(write_end)
         time.sleep(60)
         os._exit(0)
-    assert os.WTERMSIG(os.waitpid(pid, 0)[1]) == signal.SIGKILL
+    assert os.WTERMSIG(os.waitpid(pid, 0)[1]) == signal.SIGALRM
 
 
 def test_standard_input_is_left_alone_unless_it_is_a_lifeline(
