@@ -13,7 +13,7 @@ WORKERS := $(shell echo $$(($$(getconf _NPROCESSORS_ONLN) + 1)))
 PYTEST := $(VENV)/bin/python -m pytest --numprocesses $(WORKERS) --maxprocesses 4 --dist loadfile --no-loadscope-reorder
 # Tests of kernels that are short enough without a compiler.
 INTERPRETED := $(addprefix tests/,model/dynamics sim/environment model/robot sim/sensors sim/faults \
-  control/laws $(addprefix control/controller/test_,tracking.py time_delay_estimation.py controller.py))
+  control/laws control/controller/test_controller.py)
 PIP := $(VENV)/bin/python -m pip install -qq --disable-pip-version-check
 PIP_INSTALL := $(PIP) $(foreach file,$(CONSTRAINTS),--constraint $(file) --build-constraint $(file))
 
