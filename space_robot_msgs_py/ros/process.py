@@ -81,7 +81,11 @@ def hold_to_standard_input() -> None:
 
 
 def hold_to(descriptor: int) -> None:
-    """Send this process SIGTERM when the pipe's other end is closed, and later SIGALRM."""
+    """Send this process SIGTERM when the pipe's other end is closed, and later SIGALRM.
+
+    Called by the main thread.
+    """
+    signal.signal(signal.SIGALRM, signal.SIG_DFL)
     threading.Thread(target=_wait, args=(descriptor,), name="lifeline", daemon=True).start()
 
 
