@@ -59,7 +59,8 @@ setup: $(VENV)/.flies
 fly: $(VENV)/.flies
 	@$(VENV)/bin/space-robot fly --controller tde_stc --case 1 $(ARGS)
 
-test: kernels $(VENV)/.tests
+test:
+	@$(MAKE) --no-print-directory --jobs 2 kernels $(VENV)/.collected
 	$(PYTEST) $(if $(DOCS),,-m "not docs") $(ARGS)
 
 test-docs: kernels $(VENV)/.tests
