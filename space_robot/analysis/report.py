@@ -19,15 +19,12 @@ from .measure import evaluate
 from .report_tables import comparison_table, sizing_table
 from .series import GROUPS
 from .sizing import ActuatorSet, load_requirements
-from .words import Report, law_text, notes, remarks, warnings
+from .words import WARNING_GROUPS, Report, law_text, notes, remarks, warnings
 
 if TYPE_CHECKING:
     import jinja2
 
-IN_BRIEF = (
-    *("errors", "drift", "navigation", "torques", "roughness", "ripple"),
-    *("wheel_saturation", "wheel_reversals", "standing", "beyond_limits", "effort_used"),
-)
+IN_BRIEF = ("errors", "drift", "navigation", "roughness", *WARNING_GROUPS)
 """Groups of metrics that `rms_table`, its remarks and `warnings` show of any flight."""
 DESCRIBED = ("controller", "case", "gains", "robot")
 """Keys of a flight's description that a report repeats."""

@@ -29,6 +29,13 @@ LASTING_CYCLE = 0.5
 """Least share of a flight's segments that have the ripple of a limit cycle; a burst has less."""
 
 
+WARNING_GROUPS = (
+    *("torques", "ripple", "wheel_saturation", "wheel_reversals", "standing"),
+    *("beyond_limits", "effort_used"),
+)
+"""The groups of metrics that `warnings` needs."""
+
+
 def flown(described: Mapping[str, Any]) -> str:
     """Say in a few words what was flown, by a report or the description in a bag."""
     law = law_text(described)

@@ -20,7 +20,7 @@ from ...analysis.pointing import lacking_for_jitter
 from ...analysis.series import GROUPS, SeriesGroup
 from ...analysis.tool_path import leads_tool
 from ...analysis.torques import lacking_for_ripple
-from ...analysis.words import warnings
+from ...analysis.words import WARNING_GROUPS, warnings
 from ...flight.flown_log import empty_log
 from ...flight.plan import Flight
 from ..study import Requirement
@@ -45,11 +45,6 @@ FURTHER = (
 """Further metrics of every row, as far as a flight has them."""
 FURTHER_GROUPS = ("steadiness", "ripple", "settling", "wheel_saturation", "saturation")
 """The groups with these metrics. Every row also has the whole group ``standing``."""
-WARNING_GROUPS = (
-    *("torques", "ripple", "wheel_saturation", "wheel_reversals", "standing"),
-    *("beyond_limits", "effort_used"),
-)
-"""The groups that warnings need."""
 MESSAGE_GROUPS = ("navigation", "saturation", "latency", "commands", "estimate_error")
 """Groups that need more of a flight than its true states: measurements, commands."""
 BINS = 100
