@@ -3,14 +3,13 @@
 For shipped robots, and for arms on satellites whose URDF files are written here, the law is chosen
 as `space-robot choose` does, with 80 gain sets a law and 12 draws; then every law that took part
 flies 200 other draws with its best gains. Writes FOLDER/ROBOT.json for each robot (`--folder`), and
-the table of docs/manual/choose.md of all that are there. `--seed` is that of the search.
+prints a table of all that are there. `--seed` is that of the search.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
-import re
 import resource
 import subprocess
 import time
@@ -26,7 +25,6 @@ from space_robot.choice.criteria import CRITERIA
 from space_robot.choice.recommend import candidates_study
 from space_robot.processes.executor import cores
 
-PAGE = Path(__file__).parent / "manual" / "choose.md"
 OTHER_SEED, DRAWS = 1000, 200
 EVALUATIONS, RUNS = 80, 12
 SENSED = {"sensors": "fine", "navigation": "filtered"}
@@ -166,11 +164,7 @@ def main() -> None:
         text = json.dumps(found, indent=1, default=str)
         (asked.folder / f"{name}{suffix}.json").write_text(text, "utf-8")
         print(f"{name}: {found['sentence']} ({found['seconds']:.0f} s)", flush=True)
-    text = table(asked.folder)
-    print(text)
-    place = re.compile(r"(<!-- evidence -->\n\n).*?(\n\n<!-- end -->)", re.DOTALL)
-    page = PAGE.read_text("utf-8")
-    PAGE.write_text(place.sub(lambda match: f"{match[1]}{text}{match[2]}", page), "utf-8")
+    print(table(asked.folder))
 
 
 if __name__ == "__main__":
