@@ -69,7 +69,7 @@ class _KernelCache(_FunctionCache):  # type: ignore[misc]
         rtsys.initialize(target_context)  # what machine code calls
         loaded = self._load_overload(sig, target_context)
         if loaded is None:
-            from . import lane_type  # noqa: F401 - what the compiler knows of the words of `lanes`
+            from . import assignment, lane_type  # noqa: F401 - what the compiler then knows
         return loaded
 
     def save_overload(self, sig: Any, data: Any) -> None:

@@ -9,7 +9,9 @@ import sys
 from pathlib import Path
 
 import numba
+import numpy as np
 import pytest
+from numpy.typing import NDArray
 from paths import ROOT
 
 from space_robot_msgs_py.compiled.cache import _temporary_cache, count_compiled, index_files
@@ -185,3 +187,38 @@ def test_kernels_are_counted_through_subroutines_once_each_when_compiled() -> No
     assert count_compiled(files) == 0
     assert leaf(1.0) == 2.0
     assert count_compiled(files) == 1
+
+
+# Assignment to parts of arrays, which is our own
+
+
+@kernel
+def assign(row: NDArray[np.float64], matrix: NDArray[np.float64]) -> None:
+    row[1:] = row[:-1]
+    row[0] = 7
+    row[-3:-1] = row[-2:]
+    matrix[1] = row[:3]
+    matrix[:, 2] = row[:4]
+    matrix[2:, :] = matrix[:2]
+    matrix[0, 1:] = row[:2]
+    matrix[3:] = 2
+    matrix[::2] = 0.5
+
+
+def test_parts_of_arrays_are_assigned_as_numpy_does_also_where_they_overlap() -> None:
+    compiled, interpreted = ([np.arange(6.0), np.arange(12.0).reshape(4, 3)] for _ in range(2))
+    assign(*compiled)
+    assign.py_func(*interpreted)  # type: ignore[attr-defined]
+    for ours, theirs in zip(compiled, interpreted, strict=True):
+        np.testing.assert_array_equal(ours, theirs)
+
+
+@kernel
+def shift(row: NDArray[np.float64], values: NDArray[np.float64]) -> None:
+    row[1:] = values
+
+
+@pytest.mark.parametrize("size", [1, 2, 4])
+def test_an_array_is_not_assigned_to_a_part_of_another_size(size: int) -> None:
+    with pytest.raises(ValueError, match="part of another size"):
+        shift(np.zeros(4), np.zeros(size))
