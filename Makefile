@@ -11,6 +11,7 @@ PACKAGES := space_robot space_robot_control space_robot_model space_robot_msgs_p
 # One process more than there are cores: graphs of nodes wait for one another.
 WORKERS := $(shell echo $$(($$(getconf _NPROCESSORS_ONLN) + 1)))
 PYTEST := $(VENV)/bin/python -m pytest --numprocesses $(WORKERS) --maxprocesses 4 --dist loadfile --no-loadscope-reorder
+CHOSEN := $(if $(DOCS),,-m "not docs")
 # Tests of kernels that are short enough without a compiler.
 INTERPRETED := $(addprefix tests/,model/dynamics sim/environment model/robot sim/sensors sim/faults \
   control/laws control/controller/test_controller.py)
@@ -61,14 +62,15 @@ fly: $(VENV)/.flies
 
 test:
 	@$(MAKE) --no-print-directory --jobs 2 kernels $(VENV)/.collected
-	$(PYTEST) $(if $(DOCS),,-m "not docs") $(ARGS)
+	$(PYTEST) $(CHOSEN) $(ARGS)
 
-test-docs: kernels $(VENV)/.tests
+test-docs:
+	@$(MAKE) --no-print-directory --jobs 2 kernels $(VENV)/.collected
 	$(PYTEST) -m docs $(ARGS)
 
 check:
 	@$(MAKE) --no-print-directory --jobs 2 lint kernels $(VENV)/.collected
-	@$(MAKE) --no-print-directory test
+	$(PYTEST) $(CHOSEN) $(ARGS)
 
 quick: $(VENV)/.tests
 	$(PYTEST) -m "not ros and not slow and not docs" $(ARGS)
