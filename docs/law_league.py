@@ -1,92 +1,307 @@
-"""Put tables and figures of the flown campaigns into law_league.md.
+"""Eleven laws at their best: numbers and figure of law_league.md.
 
-`python docs/law_league.py` does so. The page names the folders: between ``<!-- begin DIR -->`` and
-``<!-- end -->`` are the tables in which `space-robot campaign report DIR --markdown` compares laws.
-The figure goes beside the page, named like the folder. ``<!-- begin DIR medians -->`` has one
-table, a metric a row, ``<!-- begin DIR ranks -->`` one with medians and ranks. Folders that are not
-there are left out.
+`python docs/law_league.py [NAME ...]` searches the fronts of all laws for each of `SETTINGS`, and
+chooses a law for each robot as `space-robot choose` does; then the best five laws fly 200 other
+draws. Writes FOLDER/NAME.json for each (`--folder`), and puts what is
+there into the page. `--seed` is that of the search; the page has those of seed 1.
 """
 
 from __future__ import annotations
 
+import argparse
+import json
 import re
+import resource
+import subprocess
+import time
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+from xml.etree import ElementTree as Xml
 
-from space_robot.analysis.figures.style import save_figure
-from space_robot.campaign.flown import FlownCampaign
-from space_robot.campaign.report.documents import sections
-from space_robot.campaign.report.figures import summary_figure
-from space_robot.campaign.report.findings import Findings
-from space_robot.campaign.report.tables import choice_tables, league_tables
-from space_robot.console.tables import Column, Group, Table, as_markdown
+import yaml
+
+from space_robot import Scenario
+from space_robot.analysis.figures.style import house_style, page, save_figure
+from space_robot.choice import ChoiceOptions, Uncertainty, recommend
+from space_robot.choice.candidates import comparisons, fly_candidates, ranked
+from space_robot.choice.criteria import CRITERIA
+from space_robot.choice.law_search import prepare
+from space_robot.choice.recommend import candidates_study
+from space_robot.choice.report import draw_fronts
+from space_robot.processes.executor import cores
 
 HERE = Path(__file__).parent
 PAGE = HERE / "law_league.md"
-BLOCK = re.compile(
-    r"(<!-- begin (\S+)( medians| ranks)?( with figure)? -->\n).*?(<!-- end -->)", re.DOTALL
-)
-COMPARING = {"rank", "to fly"}
-"""Columns of tables that compare laws."""
-LEFT_OUT = re.compile("joints 1-3|, largest")
-"""Metrics that only the table with ranks has, or none: RMS decides, and the wrist."""
+OTHER_SEED, DRAWS = 1000, 200
+EVALUATIONS, RUNS = 80, 12
+MOST = 5
+"""Laws that fly the other draws."""
+FEW = 48
+"""Gain sets of each law where only its front is searched."""
+COMMAND = "docs/law_league.py"
+SENSED = {"sensors": "fine", "navigation": "filtered"}
+PAPER: dict[str, Any] = {"robot": "paper", "case": "1", **SENSED}
+SETTINGS: dict[str, tuple[str, dict[str, Any], Uncertainty]] = {
+    "rigid": ("masses known, no friction", {"friction": False}, Uncertainty(mass=0.0)),
+    "masses": ("masses within 20 %, no friction", {"friction": False}, Uncertainty()),
+    "friction": ("masses within 20 %, friction", {}, Uncertainty()),
+    "gears": ("the same, joints on gears", {"gears": True}, Uncertainty()),
+}
+"""Of the paper's robot: title, further options, what no law knows."""
+STIFFNESS = 1e5
+"""N m/rad of the gears of joints 1 to 3; a fifth of it on joints 4 to 6."""
+SHIPPED: dict[str, dict[str, Any]] = {
+    "paper": {"case": "3", "actuators": "wheels", **SENSED},
+    "canadarm2": {"case": "1", **SENSED},
+    "ets_vii": {"case": "1", "orbit": "ets_vii", "actuators": "wheels", **SENSED},
+}
+Link = tuple[float, float]
+"""Mass, kg, and length, m."""
+SATELLITES: dict[str, tuple[float, float, float, float, str, Sequence[Link]]] = {
+    # mass of the bus, kg, its side, m, Coulomb and viscous friction, axes of the joints, links
+    "picker": (60.0, 0.6, 0.02, 0.1, "zyyz", [(2.0, 0.1), (3.0, 0.5), (2.0, 0.4), (0.6, 0.1)]),
+    "servicer": (
+        *(180.0, 1.0, 0.08, 0.3, "zyyzyz"),
+        [(4.0, 0.1), (6.0, 0.6), (4.0, 0.5), (2.0, 0.1), (1.5, 0.1), (0.8, 0.1)],
+    ),
+    "inspector": (
+        *(300.0, 1.2, 0.15, 0.8, "zyzyzyz"),
+        [(5.0, 0.15), (7.0, 0.55), (4.0, 0.15), (5.0, 0.5), (3.0, 0.12), (2.0, 0.12), (1.2, 0.1)],
+    ),
+}
 
 
-def block(findings: Findings) -> str:
-    """Return the tables that compare laws, and draw the campaign's figure."""
-    comparing = [
-        table
-        for section in sections(findings)
-        for table in section.tables
-        if COMPARING & {column.name for column in table.columns}
-        and not LEFT_OUT.search(table.title)
-    ]
-    text = as_markdown("", comparing).removeprefix("# \n\n")
-    return figure(findings) + re.sub(r"^## ", "### ", text, flags=re.MULTILINE)
+def urdf(name: str) -> str:
+    """Return an arm of boxes on a cubic satellite."""
+    bus, side, coulomb, viscous, axes, links = SATELLITES[name]
+    robot = Xml.Element("robot", name=name)
+    _add_box(robot, "bus", bus, (side, side, side), 0.0)
+    parent, at = "bus", 0.5 * side
+    for number, (axis, (mass, length)) in enumerate(zip(axes, links, strict=True), 1):
+        _add_box(robot, f"link{number}", mass, (0.1, 0.1, length), 0.5 * length)
+        joint = Xml.SubElement(robot, "joint", name=f"joint{number}", type="revolute")
+        Xml.SubElement(joint, "parent", link=parent)
+        Xml.SubElement(joint, "child", link=f"link{number}")
+        Xml.SubElement(joint, "origin", xyz=f"0 0 {at}")
+        Xml.SubElement(joint, "axis", xyz={"y": "0 1 0", "z": "0 0 1"}[axis])
+        Xml.SubElement(joint, "limit", lower="-2.8", upper="2.8", velocity="0.5", effort="20")
+        Xml.SubElement(joint, "dynamics", friction=f"{coulomb}", damping=f"{viscous}")
+        parent, at = f"link{number}", length
+    return Xml.tostring(robot, "unicode")
 
 
-def figure(findings: Findings) -> str:
-    """Draw the figure of a campaign, and return the line that shows it; empty if it has none."""
-    drawn = summary_figure(findings)
-    if drawn is None:
-        return ""
-    name = f"law_{findings.folder.name}"
-    save_figure(drawn, HERE / name)
-    HERE.joinpath(f"{name}.svg").unlink()
-    return f"![{name}]({name}.png)\n\n"
+def _add_box(
+    robot: Xml.Element, name: str, mass: float, size: tuple[float, float, float], height: float
+) -> None:
+    inertial = Xml.SubElement(Xml.SubElement(robot, "link", name=name), "inertial")
+    Xml.SubElement(inertial, "origin", xyz=f"0 0 {height}")
+    Xml.SubElement(inertial, "mass", value=f"{mass}")
+    squares = sum(edge**2 for edge in size)
+    about = {f"i{k}{k}": f"{mass / 12.0 * (squares - size['xyz'.index(k)] ** 2)}" for k in "xyz"}
+    Xml.SubElement(inertial, "inertia", about | {"ixy": "0", "ixz": "0", "iyz": "0"})
 
 
-def medians(findings: Findings) -> str:
-    """Return the medians of all metrics as one table; the campaign has no grid."""
-    found = [table for table in choice_tables(findings) if not LEFT_OUT.search(table.title)]
-    rows = [[table.title, *row] for table in found for row in table.groups[0].rows]
-    columns = [Column("median", is_label=True), *found[0].columns]
-    return as_markdown("", [Table("", columns, [Group(rows)])]).lstrip("# \n")
+def scenario_of(name: str, folder: Path) -> dict[str, Any]:
+    """Return a robot's scenario; the folder of one that is not shipped is made by `new`."""
+    if name in SHIPPED:
+        return {"robot": name, **SHIPPED[name]}
+    robot, file = folder / name, folder / f"{name}.urdf"
+    if not robot.exists():
+        file.write_text(urdf(name), "utf-8")
+        made = ["space-robot", "new", str(file), "--out", str(robot)]
+        quick = ["--law", "ctc", "--law", "pd", "--evaluations", "1", "--runs", "2"]
+        # the law is chosen below; with its first gains none may fly
+        subprocess.run([*made, *quick], check=False, capture_output=True)
+    return {"robot": f"{robot}/", "case": "1", "actuators": "small_wheels", **SENSED}
 
 
-def ranks(findings: Findings) -> str:
-    """Return medians and ranks as one table, a metric a row; the campaign has no grid."""
-    rows: dict[str, dict[str, str]] = {}
-    for table in league_tables(findings):
-        if "largest" not in table.title:
-            of_laws = {row[0]: f"{row[2]} ({row[1]})" for row in table.groups[0].rows}
-            rows[table.title] = of_laws
-    laws = list(findings.names.values())
-    columns = [Column("median (rank)", is_label=True), *(Column(law) for law in laws)]
-    cells = [[title, *(own[law] for law in laws)] for title, own in rows.items()]
-    return as_markdown("", [Table("", columns, [Group(cells)])]).lstrip("# \n")
+def processor_s() -> float:
+    """Return the processor time of this process and of those that it has waited for, s."""
+    used = [resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
+    return sum(each.ru_utime + each.ru_stime for each in used)
 
 
-def renewed(found: re.Match[str]) -> str:
-    """Return a block of the page with the tables of its folder; as it is if that is not there."""
-    if not Path(found[2]).is_dir():
-        return found[0]
-    findings = Findings.of(FlownCampaign.open(found[2]))
-    runs = f"{findings.table['run'].nunique()} runs, seed {findings.seed}.\n\n"
-    picture = figure(findings) if found[4] else ""
-    of_kind = {" medians": medians, " ranks": ranks}.get(found[3], block)
-    text = of_kind(findings)
-    return f"{found[1]}{runs}{picture}{text}{found[5]}"
+def evidence(name: str, folder: Path, seed: int) -> dict[str, Any]:
+    """Choose, fly the other draws, and return what came of both."""
+    scenario = scenario_of(name, folder)
+    options = ChoiceOptions(evaluations=EVALUATIONS, runs=RUNS, seed=seed, workers=cores())
+    begun, used = time.monotonic(), processor_s()
+    choice, _ = recommend(scenario, folder / f"{name}.{seed}", options, COMMAND)
+    seconds, used = time.monotonic() - begun, processor_s() - used
+    criterion = CRITERIA[options.criterion]
+    nominal = Scenario(**scenario).check()
+    study = candidates_study(scenario, nominal, options.uncertainty)
+    candidates = [each.candidate for each in choice.order[:MOST]]
+    how = options.criterion, DRAWS, OTHER_SEED, options.workers
+    flown = fly_candidates(study, candidates, *how)
+    order = ranked(flown, criterion)
+    chosen = [each for each in flown if each.law == choice.law]
+    others = [each for each in order if each.law != choice.law]
+    return {
+        "robot": name,
+        "joints": nominal.robot.n,
+        "seconds": seconds,
+        "processor_s": used,
+        "sentence": choice.sentence,
+        "law": choice.law,
+        "out": {**choice.out, **{each.law: each.reason for each in flown if each.reason}},
+        "fronts": {law: [list(t.score[:2]) for t in f.best] for law, f in choice.fronts.items()},
+        "order": {each.law: each.median(criterion.value) for each in choice.order},
+        "medians": {each.law: each.median(criterion.value) for each in order},
+        "compared": [
+            {"other": c.other, "ratio": list(c.ratio), "finding": c.finding}
+            for c in comparisons([*chosen, *others], criterion)
+        ],
+    }
+
+
+def geared() -> dict[str, Any]:
+    """Return the paper's robot with a gear in every joint."""
+    file = HERE.parent / "config/robots/paper.yaml"
+    content: dict[str, Any] = yaml.safe_load(file.read_text("utf-8"))
+    for number, link in enumerate(content["robot"]["links"]):
+        share = 1.0 if number < 3 else 0.2
+        inertia, spring = 2.0 * share, STIFFNESS * share
+        link["drive"] = {
+            "rotor_inertia": inertia / 1e4,
+            "gear_ratio": 100.0,
+            "stiffness": spring,
+            "damping": float(f"{0.02 * (spring * inertia) ** 0.5:.4g}"),
+            "encoder": "motor",
+        }
+    return content
+
+
+def searched(name: str, seed: int) -> dict[str, Any]:
+    """Return the fronts of all laws for one of the settings."""
+    title, changes, uncertainty = SETTINGS[name]
+    options = {key: value for key, value in changes.items() if key != "gears"}
+    if changes.get("gears"):
+        options["plant_robot"] = geared()
+    how = ChoiceOptions(evaluations=FEW, seed=seed, workers=cores(), uncertainty=uncertainty)
+    with TemporaryDirectory() as folder:
+        search, _, _ = prepare({**PAPER, **options}, Path(folder), how, COMMAND)
+        fronts = search.fronts()
+    points = {front.law: [list(tried.score[:2]) for tried in front.best] for front in fronts}
+    return {"title": title, "fronts": points}
+
+
+# The page
+
+
+def read(folder: Path, names: Sequence[str]) -> dict[str, Any]:
+    """Return what is there, by name."""
+    files = {name: folder / f"{name}.json" for name in names}
+    return {n: json.loads(file.read_text("utf-8")) for n, file in files.items() if file.exists()}
+
+
+def least(front: Sequence[Sequence[float]], ripple: float) -> float | None:
+    """Return the least error on a front with at most so much ripple."""
+    return min((error for error, own in front if own <= ripple), default=None)
+
+
+def fronts_table(found: Mapping[str, Any], ripples: Sequence[float] = (0.01, 0.05)) -> str:
+    """Return the least error of each law at two ripples, a column a setting and ripple."""
+    columns = [(each, ripple) for each in found.values() for ripple in ripples]
+    titles = [f"{each['title']}: {100 * ripple:g} %" for each, ripple in columns]
+    rows = []
+    for law in next(iter(found.values()))["fronts"]:
+        values = [least(each["fronts"][law], ripple) for each, ripple in columns]
+        rows.append([f"`{law}`", *("-" if v is None else f"{v:.2g}" for v in values)])
+    return markdown(["least error at ripple", *titles], rows)
+
+
+def league(found: Mapping[str, Any]) -> str:
+    """Return each law's median error on each robot, as a multiple of the chosen law's."""
+    laws = sorted({law for each in found.values() for law in each["fronts"]})
+    rows = [[f"`{law}`", *(standing(each, law) for each in found.values())] for law in laws]
+    rows.append(["joints", *(str(each["joints"]) for each in found.values())])
+    rows.append(
+        ["median error of the chosen law", *(f"{own(each):.2g}" for each in found.values())]
+    )
+    rows.append(["time to choose, s", *(f"{each['seconds']:.0f}" for each in found.values())])
+    return markdown(["law", *(f"`{name}`" for name in found)], rows)
+
+
+def own(each: Mapping[str, Any]) -> float:
+    """Return the chosen law's median in the other draws."""
+    return float(each["medians"].get(each["law"], "nan"))
+
+
+def standing(each: Mapping[str, Any], law: str) -> str:
+    """Return how a law stands beside the chosen one."""
+    if law == each["law"]:
+        return "**1**"
+    if law in each["medians"]:
+        finding = next((c["finding"] for c in each["compared"] if c["other"] == law), "")
+        word = {"better": "", "worse": " better"}.get(finding, " alike")
+        return f"{each['medians'][law] / own(each):.2f}{word}"
+    if law in each["order"] and law not in each["out"]:
+        return f"({each['order'][law] / each['order'][each['law']]:.2g})"
+    return "out"
+
+
+def markdown(titles: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    """Return a table."""
+    lines = [titles, ["---"] * len(titles), *rows]
+    return "\n".join(f"| {' | '.join(line)} |" for line in lines)
+
+
+def draw(found: Mapping[str, Any]) -> None:
+    """Draw the fronts, a panel a setting."""
+    with house_style():
+        figure = page(150.0)
+        panels = figure.subplots(2, 2, sharex=True, sharey=True)
+        for axes, each in zip(panels.flat, found.values(), strict=False):
+            draw_fronts(axes, each["fronts"])
+            axes.set_title(each["title"])
+        for axes in panels[1]:
+            axes.set_xlabel("ripple of the torques, % of the largest")
+        for axes in panels[:, 0]:
+            axes.set_ylabel("error")
+        lines, names = panels[0, 0].get_legend_handles_labels()
+        figure.legend(lines, names, loc="outside right center", frameon=False)
+        save_figure(figure, HERE / "law_fronts")
+    HERE.joinpath("law_fronts.svg").unlink()
+
+
+def put(text: str, name: str, table: str) -> str:
+    """Return a page with a table between its marks."""
+    block = re.compile(rf"(<!-- begin {name} -->\n).*?(\n<!-- end -->)", re.DOTALL)
+    return block.sub(lambda found: f"{found[1]}{table}{found[2]}", text)
+
+
+def main() -> None:
+    """Run the command."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    names = [*SETTINGS, *SHIPPED, *SATELLITES]
+    parser.add_argument("names", nargs="*", metavar="NAME", help=f"of {', '.join(names)}")
+    parser.add_argument("--folder", type=Path, default=Path("law_league"))
+    parser.add_argument("--seed", type=int, default=1, help="of the search")
+    asked = parser.parse_args()
+    asked.folder.mkdir(parents=True, exist_ok=True)
+    suffix = "" if asked.seed == 1 else f".{asked.seed}"
+    for name in asked.names or names:
+        is_setting = name in SETTINGS
+        found = (
+            searched(name, asked.seed) if is_setting else evidence(name, asked.folder, asked.seed)
+        )
+        text = json.dumps(found, indent=1, default=str)
+        (asked.folder / f"{name}{suffix}.json").write_text(text, "utf-8")
+        print(f"{name}: {found.get('sentence') or 'searched'}", flush=True)
+    fronts, robots = (
+        read(asked.folder, each) for each in (tuple(SETTINGS), names[len(SETTINGS) :])
+    )
+    text = PAGE.read_text("utf-8")
+    if fronts:
+        draw(fronts)
+        text = put(text, "fronts", fronts_table(fronts))
+    if robots:
+        text = put(text, "robots", league(robots))
+    PAGE.write_text(text, "utf-8")
 
 
 if __name__ == "__main__":
-    PAGE.write_text(BLOCK.sub(renewed, PAGE.read_text("utf-8")), "utf-8")
+    main()

@@ -7,9 +7,7 @@ import re
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
-import yaml
 from shown import NUMBER, ROOT, block, check, run, step
 
 
@@ -145,36 +143,6 @@ def test_the_page_on_stability_has_the_numbers_of_its_command() -> None:
     assert not any(axis["applies"] for axis in bounds)
     assert not any(axis["holds"] for axis in twisting["beta_below_k_2"])
     assert set(lmi["measured_beta"]) == {None}
-
-
-METRICS = ("attitude.rms", "joints_4_6.rms", "base_torque.ripple")
-"""Columns of the page's tables."""
-
-
-def test_the_page_on_real_spacecraft_has_what_its_commands_give(tmp_path: Path) -> None:
-    """Two laws' rows of the first table, by its commands."""
-    three, file, folder = (tmp_path / name for name in ("three", "three.yaml", "campaign"))
-    tune = "gains tune --case 1 --case 4-2 --sensors fine --navigation filtered --bandwidth 3 -o"
-    run(*tune.split(), str(three))
-    content = yaml.safe_load((ROOT / "config/campaigns/sensor_grades.yaml").read_text("utf-8"))
-    content["laws"] = [f"{law}={three}" for law in ("ctc", "tde_stc")]
-    content["vary"]["scenario.sensors"] = {"grid": ["fine"]}
-    file.write_text(yaml.safe_dump(content), "utf-8")
-    run("campaign", "run", str(file), "--runs", "9", "--out", str(folder), "--workers", "0")
-    metrics = [f"--metric={name}" for name in METRICS]
-    report = json.loads(run("campaign", "report", str(folder), *metrics, "--json"))
-    page = (ROOT / "docs/explanation/real_spacecraft.md").read_text("utf-8")
-    for law in content["laws"]:
-        row = re.search(rf"^\| fine \| {law.partition('=')[0]} \|(.*)\|$", page, re.MULTILINE)
-        assert row is not None
-        medians = [
-            standing["median"]["value"]
-            for league in report["leagues"]
-            for standing in league["standings"]
-            if standing["law"] == law
-        ]
-        shown = [float(text) for text in row.group(1).split("|")]
-        np.testing.assert_allclose(shown, medians, rtol=0.06)
 
 
 def test_the_page_on_campaigns_has_what_its_commands_print(tmp_path: Path) -> None:

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import yaml
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ..analysis.figures.figure_set import SavedFigure
@@ -120,13 +121,25 @@ def fronts_figure(fronts: Mapping[str, Front], chosen: str = "") -> Figure:
     """Draw error against ripple for each law; a dot is a gain set on its front."""
     figure = page(95.0)
     axes = figure.add_subplot()
+    draw_fronts(axes, {law: [t.score[:2] for t in f.best] for law, f in fronts.items()}, chosen)
+    axes.set_xlabel("ripple of the torques, % of the largest in the mission")
+    axes.set_ylabel("error")
+    if any(front.best for front in fronts.values()):
+        axes.legend(loc="center left", bbox_to_anchor=(1.01, 0.5), frameon=False)
+    return figure
+
+
+def draw_fronts(
+    axes: Axes, fronts: Mapping[str, Sequence[Sequence[float]]], chosen: str = ""
+) -> None:
+    """Draw fronts, each of pairs of error and ripple, with one colour and line for each law."""
     for number, (law, front) in enumerate(fronts.items()):
-        points = np.array([(t.score.ripple, t.score.error) for t in front.best])
-        if not len(points):
+        if not front:
             continue
+        points = np.array(front)
         axes.step(
-            100.0 * points[:, 0],
-            points[:, 1],
+            100.0 * points[:, 1],
+            points[:, 0],
             where="post",
             color=COLOURS[number % len(COLOURS)],
             linestyle=("-", "--")[number // len(COLOURS) % 2],
@@ -136,12 +149,7 @@ def fronts_figure(fronts: Mapping[str, Front], chosen: str = "") -> Figure:
         )
     axes.set_xscale("log")
     axes.set_yscale("log")
-    axes.set_xlabel("ripple of the torques, % of the largest in the mission")
-    axes.set_ylabel("error")
     axes.grid(True, which="major", alpha=0.3)
-    if any(front.best for front in fronts.values()):
-        axes.legend(loc="center left", bbox_to_anchor=(1.01, 0.5), frameon=False)
-    return figure
 
 
 def write_report(choice: Recommendation, folder: Path, command: str) -> Path:

@@ -23,7 +23,7 @@ from paths import CONFIG, DATA, DOCS
 SHORTER = {
     r"campaign run .*first": "--runs 12 --workers 0",  # row 11 is flown again
     # a grid of four
-    r"campaign run .*(law_league_|sensor_grades|three|tool_errors)": "--runs 4 --workers 0",
+    r"campaign run .*(sensor_grades|tool_errors)": "--runs 4 --workers 0",
     r"campaign run .*base_actuators": "--runs 6 --workers 0",  # a grid of six
     r"campaign run .*ets_vii": "--runs 6 --workers 0",  # grids of six and of three
     r"campaign run .*noise": "--runs 2 --workers 0",  # a grid of two
@@ -89,7 +89,7 @@ NOT_RUN = {
     r"make\b|BAG_FUZZ_EXAMPLES": "runs these tests, or for long",
     r"nft\b": "the machine's firewall",
     r"dask\b|.*--scheduler": "a cluster: tests/laboratory/processes/test_pool.py has one",
-    r"python docs/law_league.py": "4,000 flights",
+    r"python docs/law_league.py": "eleven laws on nine robots, for an hour and a half",
     r"python docs/ets_vii_tables.py": "450 flights: test_ets_vii.py flies some of them",
     r"python docs/campaign_statistics.py": "a minute: test_verdicts.py compares its table",
     r"python docs/view_picture.py": "a browser: tests/laboratory/view has one",

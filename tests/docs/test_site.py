@@ -29,7 +29,7 @@ NARROW = (
     "compare.html",
     "tutorial.html",
     "law_league.html",
-    "notebooks/real_spacecraft.html",
+    "notebooks/paper.html",
     "explanation/theory.html",
     "reference/parameters.html",
     "reference/commands.html",
