@@ -1,7 +1,7 @@
 """Eleven laws at their best: numbers and figure of law_league.md.
 
 `python docs/law_league.py [NAME ...]` searches the fronts of all laws for each of `SETTINGS`, and
-chooses a law for each robot as `space-robot choose` does; then the best five laws fly 200 other
+chooses a law for each robot as `space-robot choose` does; then the best three laws fly 200 other
 draws. Writes FOLDER/NAME.json for each (`--folder`), and puts what is
 there into the page. `--seed` is that of the search; the page has those of seed 1.
 """
@@ -36,7 +36,7 @@ HERE = Path(__file__).parent
 PAGE = HERE / "law_league.md"
 OTHER_SEED, DRAWS = 1000, 200
 EVALUATIONS, RUNS = 80, 12
-MOST = 5
+MOST = 3
 """Laws that fly the other draws."""
 FEW = 48
 """Gain sets of each law where only its front is searched."""

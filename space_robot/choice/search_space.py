@@ -164,8 +164,8 @@ class SearchSpace:
         """
         count = len(next(iter(start.gains.values())))
         zeros = {name: np.zeros(count) for name in law.gain_descriptions()}
-        own = {name: values.copy() for name, values in start.gains.items()}
-        self.start = start = replace(start, gains={**zeros, **own})
+        given = {name: values.copy() for name, values in start.gains.items()}
+        self.start = start = replace(start, gains={**zeros, **given})
         self._known = {name: np.zeros(count) for name in ("coulomb", "viscous", "dead_band")}
         self._known["coulomb"][BASE_AXES:], self._known["viscous"][BASE_AXES:] = friction.T
         self._known["dead_band"][BASE_AXES:] = DEAD_BAND_RATE
@@ -180,25 +180,14 @@ class SearchSpace:
             if factor is DEAD_BAND and not friction[:, 0].any():
                 continue
             if is_short and factor.name in FROZEN:
-                for name in powers:
-                    start.gains[name][:] = self._reference(name, start.gains)
-                continue
-            low, high = factor.lowest, factor.highest
-            if factor.name == BANDWIDTH and start.bandwidth:
-                if bandwidth is not None:
-                    for name, power in powers.items():
-                        start.gains[name][:] *= (bandwidth / start.bandwidth) ** power
-                    continue
-                low, high = (w / start.bandwidth for w in (SLOWEST_RAD_S, FASTEST_RAD_S))
-            own_parts = {"": slice(None)} if factor.is_common else parts
-            for part, axes in own_parts.items():
-                if factor.is_low_pass:
-                    fastest = float(max(np.max(start.gains[name][axes]) for name in powers))
-                    low, high = (2.0 * np.pi * hz / fastest for hz in (SLOWEST_HZ, FASTEST_HZ))
-                label = part + factor.name
-                self.coordinates.append(
-                    Coordinate(label, powers, axes, low, high, factor.is_low_pass)
-                )
+                self._hold(powers, 1.0)
+            elif factor.name == BANDWIDTH and start.bandwidth and bandwidth is not None:
+                self._hold(powers, bandwidth / start.bandwidth)
+            else:
+                for part, axes in ({"": slice(None)} if factor.is_common else parts).items():
+                    low, high = self._ends(factor, powers, axes)
+                    own = part + factor.name, powers, axes, low, high, factor.is_low_pass
+                    self.coordinates.append(Coordinate(*own))
         if has_low_pass:
             corner = start.corner_hz or FASTEST_HZ
             low, high = SLOWEST_HZ / corner, FASTEST_HZ / corner
@@ -206,6 +195,25 @@ class SearchSpace:
         self._low, self._high = (
             np.log([getattr(c, end) for c in self.coordinates]) for end in ("lowest", "highest")
         )
+
+    def _hold(self, powers: Mapping[str, float], factor: float) -> None:
+        """Leave gains out of the search, with a factor on where they begin."""
+        gains = self.start.gains
+        for name, power in powers.items():
+            gains[name][:] = self._reference(name, gains) * factor**power
+
+    def _ends(
+        self, factor: Factor, powers: Mapping[str, float], axes: slice
+    ) -> tuple[float, float]:
+        """Return the least and the largest factor on some axes."""
+        if factor.is_low_pass:
+            gains = self.start.gains
+            fastest = float(max(np.max(gains[name][axes]) for name in powers))
+            return 2.0 * np.pi * SLOWEST_HZ / fastest, 2.0 * np.pi * FASTEST_HZ / fastest
+        if factor.name == BANDWIDTH and self.start.bandwidth:
+            slowest, fastest = SLOWEST_RAD_S, FASTEST_RAD_S
+            return slowest / self.start.bandwidth, fastest / self.start.bandwidth
+        return factor.lowest, factor.highest
 
     @property
     def dimension(self) -> int:
