@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+from functools import cache
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from space_robot_control.allocation.allocation import Allocation, allocate
+from space_robot_control.allocation.allocation import Allocation, allocation_code
 from space_robot_control.allocation.settings import AllocationSettings
 from space_robot_control.allocation.wheel_set import WheelSet, tabulate
 from space_robot_model.hardware.base_actuators import BaseActuatorSettings
+from space_robot_msgs_py.compiled.kernels import RecordFunction
 from space_robot_msgs_py.samples import MOST_WHEELS, State
 
 Array = NDArray[np.float64]
@@ -18,6 +20,11 @@ Array = NDArray[np.float64]
 PERIOD = 5e-4
 INERTIA = 0.02
 PYRAMID = np.array([[1, 0, 0.7], [0, 1, 0.7], [-1, 0, 0.7], [0, -1, 0.7]])
+
+
+@cache
+def allocate() -> RecordFunction:
+    return allocation_code(is_used=True)
 
 
 def unit(axes: Array) -> Array:
@@ -101,7 +108,8 @@ class AllocationBench:
         allocation.reported_torques[:] = state.wheel_torques
         allocation.demand[:] = demand
         allocation.torquers.magnetic_field[:] = field
-        allocate(allocation, float(self.tick))
+        # as flights call it: so it is not compiled once more
+        allocate().call(np.asarray(allocation).ctypes.data, 0, float(self.tick))
         first = self.count + self.thruster_count
         self.command = command = allocation.command[:first].copy()
         self.dipoles = allocation.command[first : first + 3].copy()
