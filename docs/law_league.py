@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import math
 import re
 import resource
 import subprocess
@@ -50,6 +51,8 @@ SETTINGS: dict[str, tuple[str, dict[str, Any], Uncertainty]] = {
     "gears": ("the same, joints on gears", {"gears": True}, Uncertainty()),
 }
 """Of the paper's robot: title, further options, what no law knows."""
+LARGEST_RIPPLE = 0.5
+"""That is drawn."""
 STIFFNESS = 1e5
 """N m/rad of the gears of joints 1 to 3; a fifth of it on joints 4 to 6."""
 SHIPPED: dict[str, dict[str, Any]] = {
@@ -206,12 +209,12 @@ def least(front: Sequence[Sequence[float]], ripple: float) -> float | None:
 def fronts_table(found: Mapping[str, Any], ripples: Sequence[float] = (0.01, 0.05)) -> str:
     """Return the least error of each law at two ripples, a column a setting and ripple."""
     columns = [(each, ripple) for each in found.values() for ripple in ripples]
-    titles = [f"{each['title']}: {100 * ripple:g} %" for each, ripple in columns]
+    titles = [f"{name}: {100 * ripple:g} %" for name in found for ripple in ripples]
     rows = []
     for law in next(iter(found.values()))["fronts"]:
         values = [least(each["fronts"][law], ripple) for each, ripple in columns]
         rows.append([f"`{law}`", *("-" if v is None else f"{v:.2g}" for v in values)])
-    return markdown(["least error at ripple", *titles], rows)
+    return markdown(["law", *titles], rows)
 
 
 def league(found: Mapping[str, Any]) -> str:
@@ -222,7 +225,9 @@ def league(found: Mapping[str, Any]) -> str:
     rows.append(
         ["median error of the chosen law", *(f"{own(each):.2g}" for each in found.values())]
     )
-    rows.append(["time to choose, s", *(f"{each['seconds']:.0f}" for each in found.values())])
+    rows.append(
+        ["time to choose, s", *(f"{each['seconds'] or math.nan:.0f}" for each in found.values())]
+    )
     return markdown(["law", *(f"`{name}`" for name in found)], rows)
 
 
@@ -256,7 +261,13 @@ def draw(found: Mapping[str, Any]) -> None:
         figure = page(150.0)
         panels = figure.subplots(2, 2, sharex=True, sharey=True)
         for axes, each in zip(panels.flat, found.values(), strict=False):
-            draw_fronts(axes, each["fronts"])
+            draw_fronts(
+                axes,
+                {
+                    law: [point for point in front if point[1] <= LARGEST_RIPPLE]
+                    for law, front in each["fronts"].items()
+                },
+            )
             axes.set_title(each["title"])
         for axes in panels[1]:
             axes.set_xlabel("ripple of the torques, % of the largest")
@@ -270,8 +281,8 @@ def draw(found: Mapping[str, Any]) -> None:
 
 def put(text: str, name: str, table: str) -> str:
     """Return a page with a table between its marks."""
-    block = re.compile(rf"(<!-- begin {name} -->\n).*?(\n<!-- end -->)", re.DOTALL)
-    return block.sub(lambda found: f"{found[1]}{table}{found[2]}", text)
+    block = re.compile(rf"(<!-- begin {name} -->\n).*?(<!-- end -->)", re.DOTALL)
+    return block.sub(lambda found: f"{found[1]}{table}\n{found[2]}", text)
 
 
 def main() -> None:
@@ -281,10 +292,11 @@ def main() -> None:
     parser.add_argument("names", nargs="*", metavar="NAME", help=f"of {', '.join(names)}")
     parser.add_argument("--folder", type=Path, default=Path("law_league"))
     parser.add_argument("--seed", type=int, default=1, help="of the search")
+    parser.add_argument("--page", action="store_true", help="search nothing: write the page anew")
     asked = parser.parse_args()
     asked.folder.mkdir(parents=True, exist_ok=True)
     suffix = "" if asked.seed == 1 else f".{asked.seed}"
-    for name in asked.names or names:
+    for name in () if asked.page else asked.names or names:
         is_setting = name in SETTINGS
         found = (
             searched(name, asked.seed) if is_setting else evidence(name, asked.folder, asked.seed)
