@@ -8,8 +8,8 @@ CONSTRAINTS := constraints.txt
 CONSTRAINED := campaign dask dist docs gym mpc mutation notebooks parquet ros test view xacro
 PACKAGES := space_robot space_robot_control space_robot_model space_robot_msgs_py space_robot_sim
 # A file's tests run in one process; tests/conftest.py has the files in an order that fills all.
-# One process more than there are cores: graphs of nodes wait for one another.
-WORKERS := $(shell echo $$(($$(getconf _NPROCESSORS_ONLN) + 1)))
+# Two processes more than there are cores: graphs of nodes wait for one another.
+WORKERS := $(shell echo $$(($$(getconf _NPROCESSORS_ONLN) + 2)))
 PYTEST := $(VENV)/bin/python -m pytest --numprocesses $(WORKERS) --maxprocesses 4 --dist loadfile --no-loadscope-reorder
 CHOSEN := $(if $(DOCS),,-m "not docs")
 # Tests of kernels that are short enough without a compiler.
