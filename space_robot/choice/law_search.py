@@ -179,6 +179,8 @@ class LawSearch:
 
     def __call__(self, law: str) -> Front:
         """Return the front of a law."""
+        from threadpoolctl import threadpool_limits  # comes with scikit-learn
+
         options = self.options
         trials = Trials(
             Scenario(**{**self.scenario_with(law), "duration": self.duration}),
@@ -191,9 +193,11 @@ class LawSearch:
             with Path(self.tally).open("ab") as file:
                 file.write(bytes(count))
 
-        goal, count, seed = options.goal, options.evaluations, options.seed
+        how = options.goal, options.evaluations, options.seed
         shares = (1.0,) if options.is_short else RIPPLE_SHARES
-        return search_front(trials, self.space(law), goal, count, seed, shares, note)
+        # threads for such small matrices only wait for one another, and change last digits
+        with threadpool_limits(1):
+            return search_front(trials, self.space(law), *how, shares, note)
 
     def fronts(self) -> list[Front]:
         """Return the front of each law; a progress line counts their gain sets."""

@@ -164,8 +164,8 @@ class SearchSpace:
         """
         count = len(next(iter(start.gains.values())))
         zeros = {name: np.zeros(count) for name in law.gain_descriptions()}
-        given = {name: values.copy() for name, values in start.gains.items()}
-        self.start = start = replace(start, gains={**zeros, **given})
+        own = {name: values.copy() for name, values in start.gains.items()}
+        self.start = start = replace(start, gains={**zeros, **own})
         self._known = {name: np.zeros(count) for name in ("coulomb", "viscous", "dead_band")}
         self._known["coulomb"][BASE_AXES:], self._known["viscous"][BASE_AXES:] = friction.T
         self._known["dead_band"][BASE_AXES:] = DEAD_BAND_RATE
@@ -186,8 +186,8 @@ class SearchSpace:
             else:
                 for part, axes in ({"": slice(None)} if factor.is_common else parts).items():
                     low, high = self._ends(factor, powers, axes)
-                    own = part + factor.name, powers, axes, low, high, factor.is_low_pass
-                    self.coordinates.append(Coordinate(*own))
+                    numbers = part + factor.name, powers, axes, low, high, factor.is_low_pass
+                    self.coordinates.append(Coordinate(*numbers))
         if has_low_pass:
             corner = start.corner_hz or FASTEST_HZ
             low, high = SLOWEST_HZ / corner, FASTEST_HZ / corner

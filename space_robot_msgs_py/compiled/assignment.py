@@ -26,8 +26,8 @@ def _move_array(context: Any, builder: Any, sig: Any, args: Any) -> Any:
         return arrayobj.setitem_array(context, builder, sig, args)
     source = arrayobj.make_array(values)(context, builder, args[2])
     to, shape, _ = _place(context, builder, sig, args)
-    for wanted, given in zip(shape, cgutils.unpack_tuple(builder, source.shape), strict=True):
-        with builder.if_then(builder.icmp_signed("!=", wanted, given), likely=False):
+    for wanted, size in zip(shape, cgutils.unpack_tuple(builder, source.shape), strict=True):
+        with builder.if_then(builder.icmp_signed("!=", wanted, size), likely=False):
             context.call_conv.return_user_exc(builder, ValueError, (_SIZES,))
     cgutils.raw_memmove(builder, to, source.data, source.nitems, source.itemsize)
     return context.get_dummy_value()
