@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import math
 import re
 import resource
 import subprocess
@@ -225,9 +224,6 @@ def league(found: Mapping[str, Any]) -> str:
     rows.append(
         ["median error of the chosen law", *(f"{own(each):.2g}" for each in found.values())]
     )
-    rows.append(
-        ["time to choose, s", *(f"{each['seconds'] or math.nan:.0f}" for each in found.values())]
-    )
     return markdown(["law", *(f"`{name}`" for name in found)], rows)
 
 
@@ -285,12 +281,21 @@ def put(text: str, name: str, table: str) -> str:
     return block.sub(lambda found: f"{found[1]}{table}\n{found[2]}", text)
 
 
+def renewed(text: str, folder: Path) -> str:
+    """Return the page with tables of what is in a folder."""
+    if fronts := read(folder, tuple(SETTINGS)):
+        text = put(text, "fronts", fronts_table(fronts))
+    if robots := read(folder, (*SHIPPED, *SATELLITES)):
+        text = put(text, "robots", league(robots))
+    return text
+
+
 def main() -> None:
     """Run the command."""
     parser = argparse.ArgumentParser(description=__doc__)
     names = [*SETTINGS, *SHIPPED, *SATELLITES]
     parser.add_argument("names", nargs="*", metavar="NAME", help=f"of {', '.join(names)}")
-    parser.add_argument("--folder", type=Path, default=Path("law_league"))
+    parser.add_argument("--folder", type=Path, default=HERE / "law_league")
     parser.add_argument("--seed", type=int, default=1, help="of the search")
     parser.add_argument("--page", action="store_true", help="search nothing: write the page anew")
     asked = parser.parse_args()
@@ -302,7 +307,7 @@ def main() -> None:
             searched(name, asked.seed) if is_setting else evidence(name, asked.folder, asked.seed)
         )
         text = json.dumps(found, indent=1, default=str)
-        (asked.folder / f"{name}{suffix}.json").write_text(text, "utf-8")
+        (asked.folder / f"{name}{suffix}.json").write_text(f"{text}\n", "utf-8")
         print(f"{name}: {found.get('sentence') or 'searched'}", flush=True)
     fronts, robots = (
         read(asked.folder, each) for each in (tuple(SETTINGS), names[len(SETTINGS) :])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import runpy
 import shlex
 from pathlib import Path
 from pkgutil import resolve_name
@@ -75,6 +76,13 @@ def test_links_lead_to_files_and_those_named_with_their_folder_exist(document: P
             assert (document.parent / target.split("#")[0]).exists(), target
     for name in re.findall(r"`((?:space_robot_\w+|tests|config|docs)/[\w./]+)`", text):
         assert (ROOT / name).exists(), name
+
+
+def test_the_page_on_eleven_laws_has_what_was_flown() -> None:
+    text = (ROOT / "docs/law_league.md").read_text("utf-8")
+    renewed = runpy.run_path(str(ROOT / "docs/law_league.py"))["renewed"]
+    assert renewed(text, ROOT / "docs/law_league") == text
+    assert text.count("| `tde_tsmc` | ") == 2
 
 
 def test_the_comparison_has_the_figures_of_the_measurements() -> None:
