@@ -1,8 +1,8 @@
 """Assignment to a part of an array in compiled code: ``a[i:j] = b``, ``a[i] = b``, ``a[i:j] = 0``.
 
-Numba's own provides for broadcasting and for arrays that share memory, which takes an eighth of the
-compilation of all kernels. Here a contiguous array is moved into a contiguous part of the same
-size, and a number is written into each element of a part. All others are left to Numba.
+Numba's own keeps a copy of what overlaps, and takes an eighth of the compilation of all kernels.
+Here a contiguous array (n,) or (1,) is moved into a contiguous part (n,), and a number is written
+into each element of a part, as NumPy does it. All others are left to Numba.
 """
 
 from __future__ import annotations
@@ -21,15 +21,23 @@ _SIZES = "cannot assign an array to a part of another size"
 def _move_array(context: Any, builder: Any, sig: Any, args: Any) -> Any:
     whole, index, values = sig.args
     part = get_array_index_type(whole, index).result
-    is_like = (part.ndim, part.dtype) == (values.ndim, values.dtype)
-    if not is_like or (part.layout, values.layout) != ("C", "C"):
+    kinds = {(part.ndim, part.dtype, part.layout), (values.ndim, values.dtype, values.layout)}
+    if kinds != {(1, whole.dtype, "C")}:
         return arrayobj.setitem_array(context, builder, sig, args)
     source = arrayobj.make_array(values)(context, builder, args[2])
-    to, shape, _ = _place(context, builder, sig, args)
-    for wanted, size in zip(shape, cgutils.unpack_tuple(builder, source.shape), strict=True):
-        with builder.if_then(builder.icmp_signed("!=", wanted, size), likely=False):
-            context.call_conv.return_user_exc(builder, ValueError, (_SIZES,))
-    cgutils.raw_memmove(builder, to, source.data, source.nitems, source.itemsize)
+    to, (wanted,), _ = _place(context, builder, sig, args)
+    (size,) = cgutils.unpack_tuple(builder, source.shape)
+    with builder.if_else(builder.icmp_signed("==", wanted, size)) as (is_alike, differs):
+        with is_alike:
+            cgutils.raw_memmove(builder, to, source.data, size, source.itemsize)
+        with differs:
+            is_one = builder.icmp_signed("==", size, size.type(1))
+            with cgutils.if_unlikely(builder, builder.not_(is_one)):
+                context.call_conv.return_user_exc(builder, ValueError, (_SIZES,))
+            value = arrayobj.load_item(context, builder, values, source.data)
+            with cgutils.for_range(builder, wanted) as loop:
+                element = builder.gep(to, [loop.index])
+                arrayobj.store_item(context, builder, whole, value, element)
     return context.get_dummy_value()
 
 
@@ -54,7 +62,8 @@ def _place(context: Any, builder: Any, sig: Any, args: Any) -> Any:
     normal = arrayobj.normalize_indices(
         context, builder, index.types if is_tuple else (index,), indices
     )
-    return arrayobj.basic_indexing(context, builder, whole, array, *normal, boundscheck=False)
+    checks = context.enable_boundscheck
+    return arrayobj.basic_indexing(context, builder, whole, array, *normal, boundscheck=checks)
 
 
 for _index in (types.Integer, types.SliceType, types.BaseTuple):
