@@ -2,8 +2,8 @@
 
 `python docs/law_league.py [NAME ...]` searches the fronts of all laws for each of `SETTINGS`, and
 chooses a law for each robot as `space-robot choose` does; then the best three laws fly 200 other
-draws. Writes FOLDER/NAME.json for each (`--folder`), and puts what is
-there into the page. `--seed` is that of the search; the page has those of seed 1.
+draws. Writes FOLDER/NAME.json for each (`--folder`), and puts what is there into the page.
+`--seed` is that of the search; the page has those of seed 1.
 """
 
 from __future__ import annotations
@@ -11,16 +11,14 @@ from __future__ import annotations
 import argparse
 import json
 import re
-import resource
 import subprocess
+import sys
 import time
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 from xml.etree import ElementTree as Xml
-
-import yaml
 
 from space_robot import Scenario
 from space_robot.analysis.figures.style import house_style, page, save_figure
@@ -30,7 +28,11 @@ from space_robot.choice.criteria import CRITERIA
 from space_robot.choice.law_search import prepare
 from space_robot.choice.recommend import candidates_study
 from space_robot.choice.report import draw_fronts
+from space_robot.console.tables import Column, Group, Table, as_markdown
 from space_robot.processes.executor import cores
+
+sys.path.append(str(Path(__file__).parent / "flown"))
+from flexible_joints import geared
 
 HERE = Path(__file__).parent
 PAGE = HERE / "law_league.md"
@@ -47,13 +49,11 @@ SETTINGS: dict[str, tuple[str, dict[str, Any], Uncertainty]] = {
     "rigid": ("masses known, no friction", {"friction": False}, Uncertainty(mass=0.0)),
     "masses": ("masses within 20 %, no friction", {"friction": False}, Uncertainty()),
     "friction": ("masses within 20 %, friction", {}, Uncertainty()),
-    "gears": ("the same, joints on gears", {"gears": True}, Uncertainty()),
+    "gears": ("the same, joints on gears", {"plant_robot": geared(1e5, "motor")}, Uncertainty()),
 }
 """Of the paper's robot: title, further options, what no law knows."""
 LARGEST_RIPPLE = 0.5
 """That is drawn."""
-STIFFNESS = 1e5
-"""N m/rad of the gears of joints 1 to 3; a fifth of it on joints 4 to 6."""
 SHIPPED: dict[str, dict[str, Any]] = {
     "paper": {"case": "3", "actuators": "wheels", **SENSED},
     "canadarm2": {"case": "1", **SENSED},
@@ -119,20 +119,14 @@ def scenario_of(name: str, folder: Path) -> dict[str, Any]:
     return {"robot": f"{robot}/", "case": "1", "actuators": "small_wheels", **SENSED}
 
 
-def processor_s() -> float:
-    """Return the processor time of this process and of those that it has waited for, s."""
-    used = [resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
-    return sum(each.ru_utime + each.ru_stime for each in used)
-
-
 def evidence(name: str, folder: Path, seed: int) -> dict[str, Any]:
     """Choose, fly the other draws, and return what came of both."""
     scenario = scenario_of(name, folder)
     tries = EVALUATIONS if name in SHIPPED else FEW
     options = ChoiceOptions(evaluations=tries, runs=RUNS, seed=seed, workers=cores())
-    begun, used = time.monotonic(), processor_s()
+    begun = time.monotonic()
     choice, _ = recommend(scenario, folder / f"{name}.{seed}", options, COMMAND)
-    seconds, used = time.monotonic() - begun, processor_s() - used
+    seconds = time.monotonic() - begun
     criterion = CRITERIA[options.criterion]
     nominal = Scenario(**scenario).check()
     study = candidates_study(scenario, nominal, options.uncertainty)
@@ -146,7 +140,6 @@ def evidence(name: str, folder: Path, seed: int) -> dict[str, Any]:
         "robot": name,
         "joints": nominal.robot.n,
         "seconds": seconds,
-        "processor_s": used,
         "sentence": choice.sentence,
         "law": choice.law,
         "out": {**choice.out, **{each.law: each.reason for each in flown if each.reason}},
@@ -160,29 +153,9 @@ def evidence(name: str, folder: Path, seed: int) -> dict[str, Any]:
     }
 
 
-def geared() -> dict[str, Any]:
-    """Return the paper's robot with a gear in every joint."""
-    file = HERE.parent / "config/robots/paper.yaml"
-    content: dict[str, Any] = yaml.safe_load(file.read_text("utf-8"))
-    for number, link in enumerate(content["robot"]["links"]):
-        share = 1.0 if number < 3 else 0.2
-        inertia, spring = 2.0 * share, STIFFNESS * share
-        link["drive"] = {
-            "rotor_inertia": inertia / 1e4,
-            "gear_ratio": 100.0,
-            "stiffness": spring,
-            "damping": float(f"{0.02 * (spring * inertia) ** 0.5:.4g}"),
-            "encoder": "motor",
-        }
-    return content
-
-
 def searched(name: str, seed: int) -> dict[str, Any]:
     """Return the fronts of all laws for one of the settings."""
-    title, changes, uncertainty = SETTINGS[name]
-    options = {key: value for key, value in changes.items() if key != "gears"}
-    if changes.get("gears"):
-        options["plant_robot"] = geared()
+    title, options, uncertainty = SETTINGS[name]
     how = ChoiceOptions(evaluations=FEW, seed=seed, workers=cores(), uncertainty=uncertainty)
     with TemporaryDirectory() as folder:
         search, _, _ = prepare({**PAPER, **options}, Path(folder), how, COMMAND)
@@ -245,10 +218,10 @@ def standing(each: Mapping[str, Any], law: str) -> str:
     return "out"
 
 
-def markdown(titles: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+def markdown(titles: Sequence[str], rows: Sequence[list[str]]) -> str:
     """Return a table."""
-    lines = [titles, ["---"] * len(titles), *rows]
-    return "\n".join(f"| {' | '.join(line)} |" for line in lines)
+    columns = [Column(title, is_label=True) for title in titles]
+    return as_markdown("", [Table("", columns, [Group(rows)])]).strip("# \n")
 
 
 def draw(found: Mapping[str, Any]) -> None:
@@ -309,16 +282,9 @@ def main() -> None:
         text = json.dumps(found, indent=1, default=str)
         (asked.folder / f"{name}{suffix}.json").write_text(f"{text}\n", "utf-8")
         print(f"{name}: {found.get('sentence') or 'searched'}", flush=True)
-    fronts, robots = (
-        read(asked.folder, each) for each in (tuple(SETTINGS), names[len(SETTINGS) :])
-    )
-    text = PAGE.read_text("utf-8")
-    if fronts:
+    if fronts := read(asked.folder, tuple(SETTINGS)):
         draw(fronts)
-        text = put(text, "fronts", fronts_table(fronts))
-    if robots:
-        text = put(text, "robots", league(robots))
-    PAGE.write_text(text, "utf-8")
+    PAGE.write_text(renewed(PAGE.read_text("utf-8"), asked.folder), "utf-8")
 
 
 if __name__ == "__main__":

@@ -89,7 +89,7 @@ NOT_RUN = {
     r"make\b|BAG_FUZZ_EXAMPLES": "runs these tests, or for long",
     r"nft\b": "the machine's firewall",
     r"dask\b|.*--scheduler": "a cluster: tests/laboratory/processes/test_pool.py has one",
-    r"python docs/law_league.py": "eleven laws on nine robots, for an hour and a half",
+    r"python docs/law_league.py": "eleven laws, for some hours",
     r"python docs/ets_vii_tables.py": "450 flights: test_ets_vii.py flies some of them",
     r"python docs/campaign_statistics.py": "a minute: test_verdicts.py compares its table",
     r"python docs/view_picture.py": "a browser: tests/laboratory/view has one",
