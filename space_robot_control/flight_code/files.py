@@ -7,8 +7,10 @@ import inspect
 import re
 import textwrap
 from collections import defaultdict
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Any
+
+import numpy as np
 
 from space_robot_msgs_py.compiled.records import Field as RecordField
 from space_robot_msgs_py.compiled.records import Record
@@ -124,6 +126,22 @@ class Files:
         is_empty = 0 in self.program.shape(record, name)  # C has no such arrays
         return lang.FieldName(record, name) in self.fields and not is_empty
 
+    def kept(self, record: type[Record]) -> Iterator[tuple[str, tuple[int, ...] | type[Record]]]:
+        """Return the fields of an exported struct: shapes, or records."""
+        for name, field in record.fields().items():
+            if self.has(record, name):
+                is_array = isinstance(field, RecordField)
+                yield name, self.program.shape(record, name) if is_array else field  # type: ignore[misc]
+
+    def dtype(self, record: type[Record]) -> np.dtype[Any]:
+        """Return the memory layout of an exported struct."""
+        return np.dtype(
+            [
+                (name, np.float64, kind) if isinstance(kind, tuple) else (name, self.dtype(kind))
+                for name, kind in self.kept(record)
+            ]
+        )
+
     def name_of(self, function: Function) -> str:
         """Return a function's name in C."""
         return self._names[self.program.functions.index(function)]
@@ -191,7 +209,13 @@ class Files:
         for constant in sorted(self._named_numbers()):
             name = self._constants[self.program.named_numbers[constant]]
             number = constant.number
-            value = lang.literal(number) if isinstance(number, float) else f"INT64_C({number})"
+            if isinstance(number, tuple):
+                rows = ",\n    ".join(f"{{{', '.join(map(lang.literal, row))}}}" for row in number)
+                size = f"[{len(number)}][{len(number[0])}]"
+                lines.append(f"{self.program.target.table} {name}{size} = {{\n    {rows}}};\n")
+                continue
+            is_plain = isinstance(number, (float, np.uint64))
+            value = lang.literal(number) if is_plain else f"INT64_C({number})"
             value = f"({value})" if value.startswith("-") else value
             lines.append(f"#define {name} {value}\n")
         return "".join(lines)

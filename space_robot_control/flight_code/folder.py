@@ -73,12 +73,12 @@ class Exported:
     @property
     def measurement_type(self) -> np.dtype[Any]:
         """Memory layout of ``space_robot_measurement``."""
-        return np.dtype([("tick", np.int64), ("state", self.translated.dtype(State))])
+        return np.dtype([("tick", np.int64), ("state", self.translated.files.dtype(State))])
 
     @property
     def reference_type(self) -> np.dtype[Any]:
         """Memory layout of ``space_robot_reference``."""
-        return np.dtype(self.translated.dtype(Reference))
+        return self.translated.files.dtype(Reference)
 
     @property
     def command_type(self) -> np.dtype[Any]:
@@ -118,7 +118,7 @@ class Exported:
         }
 
     def _numbers(self, record: type[Record]) -> int:
-        kinds = (kind for _, kind in self.translated.kept(record))
+        kinds = (kind for _, kind in self.translated.files.kept(record))
         return sum(prod(kind) if isinstance(kind, tuple) else self._numbers(kind) for kind in kinds)
 
     def _header(self) -> str:
@@ -200,7 +200,7 @@ def _entries(
     translated: Translated, record: type[Record], numbers: Any, path: str, source: str
 ) -> Iterator[Entry]:
     texts = descriptions(record)
-    for name, kind in translated.kept(record):
+    for name, kind in translated.files.kept(record):
         inside = f"{path}.{name}"
         if not isinstance(kind, tuple):
             yield from _entries(translated, kind, numbers[name], inside, source)

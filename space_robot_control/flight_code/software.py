@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, NamedTuple
@@ -142,19 +142,6 @@ class Translated:
     tables: frozenset[lang.FieldName]
     """Fields that are computed from others when the memory is initialised."""
 
-    def kept(self, record: type[Record]) -> Iterator[tuple[str, tuple[int, ...] | type[Record]]]:
-        """Return the fields of an exported struct: shapes, or records."""
-        for name, field in record.fields().items():
-            if self.files.has(record, name):
-                is_array = isinstance(field, RecordField)
-                yield name, self.program.shape(record, name) if is_array else field  # type: ignore[misc]
-
-    def dtype(self, record: type[Record]) -> list[tuple[str, type[np.float64], tuple[int, ...]]]:
-        """Return the memory layout of a struct without nested records."""
-        return [
-            (name, np.float64, kind) for name, kind in self.kept(record) if isinstance(kind, tuple)
-        ]
-
 
 def translate(software: FlightSoftware) -> Translated:
     """Translate the flight software.
@@ -169,7 +156,10 @@ def translate(software: FlightSoftware) -> Translated:
         program, roots = _program(software, constants)
         reached = reachable(program, roots.values())
         written = {field for function in reached for field in function.stores}
-        known = _constants(software, program, written)
+        # gains may be changed in flight
+        own = (p for p in software.parts if p.name in ("supervision", "controller"))
+        blocks = [(part.record, np.array([part.numbers])) for part in own]
+        known = constant_fields(program, blocks, written)
     # what a user fills, and gains and memories of laws, have all their fields
     whole: list[type[Record]] = [State, Reference]
     whole += [part.record for part in software.parts if "_" in part.name]
@@ -233,28 +223,38 @@ def _law(law: CompiledLaw) -> lang.Value:
     return _value(lang.Bundle(law.name, tuple(items.items())))
 
 
-def _constants(
-    software: FlightSoftware, program: KernelProgram, written: set[lang.FieldName]
+def constant_fields(
+    program: KernelProgram,
+    blocks: Iterable[tuple[type[Record], NDArray[Any]]],
+    written: set[lang.FieldName],
 ) -> dict[lang.FieldName, float]:
-    numbers_of_field: dict[lang.FieldName, set[float | None]] = {}
+    """Return the fields all of whose numbers are the same, and that no kernel writes.
 
-    def visit(record: type[Record], numbers: Any) -> None:
+    Args:
+        program: with the sizes of arrays.
+        blocks: records, and arrays (k,) of them.
+        written: fields that kernels write.
+    """
+    bits_of: dict[lang.FieldName, set[int]] = {}
+
+    def visit(record: type[Record], numbers: NDArray[Any]) -> None:
         for name, field in record.fields().items():
-            if isinstance(field, RecordField):
-                kept = numbers_of(program.shape(record, name), numbers[name])
-                is_one = kept.size > 0 and np.all(kept == kept.flat[0])
-                values = numbers_of_field.setdefault(lang.FieldName(record, name), set())
-                values.add(float(kept.flat[0]) if is_one else None)
-            else:
+            if not isinstance(field, RecordField):
                 visit(field, numbers[name])
+            elif (key := lang.FieldName(record, name)) not in written:
+                kept = numbers_of((len(numbers), *program.shape(record, name)), numbers[name])
+                bits = kept.reshape(-1).view(np.int64)
+                ends = {int(bits.min()), int(bits.max())} if bits.size else {0, 1}
+                bits_of.setdefault(key, set()).update(ends)
 
-    for part in software.parts:
-        if part.name in ("supervision", "controller"):  # gains may be changed in flight
-            visit(part.record, part.numbers)
-    constants = {
-        field: values.pop() for field, values in numbers_of_field.items() if len(values) == 1
+    for record, numbers in blocks:
+        visit(record, numbers)
+    known = {
+        field: float(np.int64(bits.pop()).view(np.float64))
+        for field, bits in bits_of.items()
+        if len(bits) == 1
     }
-    return {f: c for f, c in constants.items() if c is not None and f not in written}
+    return {field: number for field, number in known.items() if number == number}
 
 
 def numbers_of(shape: tuple[int, ...], numbers: Any) -> NDArray[np.float64]:

@@ -41,7 +41,7 @@ HASH, HASH_FACTOR = np.uint64(0x43B0D7E5), np.uint64(0x931E8875)
 OUT_HASH, OUT_FACTOR = np.uint64(0x8B51F9DD), np.uint64(0x58F38DED)
 MIX_LEFT, MIX_RIGHT = np.uint64(0xCA01F9DD), np.uint64(0x4973F715)
 FACTOR_HIGH, FACTOR_LOW = np.uint64(0x2360ED051FC65DA4), np.uint64(0x4385DF649FCCF645)
-UNUSED_BITS = np.uint64(12)
+UNUSED_BITS, SPACING = np.uint64(12), 2.0**-52
 CENTRE = 0.425
 """Distance from 1/2 up to which Wichura's first pair of polynomials is used."""
 TAIL = 5.0
@@ -100,11 +100,26 @@ def normal_numbers(draws: Array, seed: float, key: int, block: int) -> None:
         state = pcg64(int(lane_of(seed, lane)), key, block)
         for i in range(lane, flat.size, width):
             state = following(state)
-            # halfway between multiples of 2**-52: never 0 or 1, whose quantiles are infinite
-            flat[i] = (np.int64(bits_of(state) >> UNUSED_BITS) + 0.5) * 2.0**-52
+            flat[i] = share_of(state)
     eights = as_lanes(flat.reshape(-1, WIDTH))
     for i in range(eights.size):
         eights[i] = quantile(eights[i])
+
+
+@kernel
+def normal_numbers_of_one(draws: Array, seed: float, key: int, block: int) -> None:
+    """Fill ``draws`` as `normal_numbers` does, one number after the other: for other processors."""
+    flat, state = draws.reshape(-1), pcg64(int(seed), key, block)
+    for i in range(flat.size):
+        state = following(state)
+        flat[i] = quantile(share_of(state))
+
+
+@subroutine
+def share_of(state: State) -> float:
+    """Return the probability in (0, 1) that the generator gives in ``state``."""
+    # halfway between multiples of 2**-52: never 0 or 1, whose quantiles are infinite
+    return (np.int64(bits_of(state) >> UNUSED_BITS) + 0.5) * SPACING
 
 
 @kernel

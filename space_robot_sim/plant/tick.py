@@ -55,8 +55,9 @@ def write_truth(model: Model, x: Array, rotation: Array, truth: State) -> None:
         j = whole(model.row[i])
         truth.joint_positions[i], truth.joint_velocities[i] = positions[j], velocities[j]
     for i in range(actuated, n):
-        j, k = whole(model.row[i]), i - actuated
-        truth.passive_positions[k], truth.passive_velocities[k] = positions[j], velocities[j]
+        j, passive = whole(model.row[i]), i - actuated
+        truth.passive_positions[passive] = positions[j]
+        truth.passive_velocities[passive] = velocities[j]
     for k in range(whole(model.wheel_count)):
         truth.wheel_velocities[k] = x[13 + 2 * n + k]
     velocity = 13 + 2 * n + whole(model.wheel_count)
@@ -108,7 +109,8 @@ def update_surroundings(
     store(torque, orbit.magnetic_torque, 0)
     rotate(data.rotation, orbit.magnetic_torque, torques[9:12])
     if uniform(orbit.has_gradient) != 0.0 and tick % REPORT_TICKS == 0:
-        data.bias[: n + 1] = 0.0
+        for i in range(n + 1):
+            data.bias[i] = 0.0
         add_gravity_gradient(model, position, x[:3], orbit.has_j2, data)
         # bias forces oppose what acts; about the base's CoM, then about the robot's
         moment, force = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)

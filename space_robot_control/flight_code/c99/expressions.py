@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import ast
 import builtins
+import math
 import operator
 from collections.abc import Callable
 from dataclasses import replace
 from types import ModuleType
 from typing import Any
+
+import numpy as np
 
 from space_robot_msgs_py.compiled.records import Field as RecordField
 
@@ -35,6 +38,7 @@ ARITHMETIC: dict[type[ast.operator], tuple[str, int, Callable[[Any, Any], Any]]]
     ast.Mod: ("py_modulo", lang.ATOM, operator.mod),
     ast.LShift: ("<<", lang.SHIFT, operator.lshift),
     ast.RShift: (">>", lang.SHIFT, operator.rshift),
+    ast.BitXor: ("^", lang.BITS, operator.xor),
 }
 COMPARISONS: dict[type[ast.cmpop], tuple[str, int, Callable[[Any, Any], Any]]] = {
     ast.Lt: ("<", lang.RELATION, operator.lt),
@@ -88,10 +92,14 @@ class Expressions:
     def _known(self, value: Any, name: str) -> Value:
         if isinstance(value, bool):
             return number_of(value)
-        if isinstance(value, (float, int)):
+        if isinstance(value, (float, int, np.uint64)):
             # its number is known, but C reads it by its name, too
             text = self.program.named(self.function.__module__, name, value)
             return replace(number_of(value), text=text, rank=lang.ATOM)
+        if isinstance(value, tuple) and value and isinstance(value[0], tuple):
+            shape = len(value), len(value[0])
+            text = self.program.named(self.function.__module__, name, value)
+            return Value(ArrayOf(shape, is_table=True), text)
         return Value(Known(value), name)
 
     def _attribute(self, node: ast.Attribute) -> Value:
@@ -190,7 +198,7 @@ class Expressions:
             rest = "" if place.constant == 0 else f" + {place.at(lang.PRODUCT)}"
             text = f"{owner.offset}{rest}"
         rest = owner.type.shape[1:]
-        kind = ArrayOf(rest) if rest else lang.FLOAT
+        kind = replace(owner.type, shape=rest) if rest else owner.type.item
         element = f"{owner.at(lang.POSTFIX)}[{text}]"
         return replace(owner, type=kind, text=element, rank=lang.POSTFIX, offset="")
 
@@ -207,7 +215,7 @@ class Expressions:
         offset = start.text if start.constant != 0 else ""
         if owner.offset:
             offset = f"{owner.offset} + {start.at(lang.PRODUCT)}" if offset else owner.offset
-        return replace(owner, type=ArrayOf((known,)), offset=offset)
+        return replace(owner, type=replace(owner.type, shape=(known,)), offset=offset)
 
     def _tuple(self, node: ast.Tuple) -> Value:
         items = [self.translate(item) for item in node.elts]
@@ -239,7 +247,7 @@ class Expressions:
             raise RefusedError(f"the operator {type(op).__name__}", "write products out")
         sign, rank, function = ARITHMETIC[type(op)]
         kind = lang.FLOAT if isinstance(op, ast.Div) else lang.joined(left.type, right.type)
-        if kind not in (lang.FLOAT, lang.INT):
+        if kind not in (lang.FLOAT, lang.INT, lang.UINT):
             raise RefusedError(f"arithmetic of {lang.described(kind)}", "use numbers")
         left, right = cast(left, kind), cast(right, kind)
         constant = None
@@ -248,11 +256,13 @@ class Expressions:
                 constant = function(left.constant, right.constant)
             if kind == lang.INT and constant is not None:
                 return number_of(constant)
+        if kind == lang.UINT and sign not in ("+", "-", "*", "<<", ">>", "^"):
+            raise RefusedError("this operator of unsigned integers", "use shifts and products")
         if kind == lang.INT and sign in "+-" and right.constant == 0:
             return left
         if kind == lang.INT and sign == "+" and left.constant == 0:
             return right
-        if sign == "<<":  # a plain literal is an int, of 32 bits
+        if sign == "<<" and kind == lang.INT:  # a plain literal is an int, of 32 bits
             left = replace(left, text=f"INT64_C({left.text})") if left.text.isdigit() else left
         if rank == lang.ATOM:
             if kind != lang.INT:
@@ -265,10 +275,9 @@ class Expressions:
 
     def _bits(self, op: ast.operator, left: Value, right: Value) -> Value:
         sign = "&" if isinstance(op, ast.BitAnd) else "|"
-        if left.type == lang.INT and right.type == lang.INT:
-            return Value(
-                lang.INT, f"{left.at(lang.SHIFT)} {sign} {right.at(lang.SHIFT)}", lang.BITS
-            )
+        if left.type == right.type and left.type in (lang.INT, lang.UINT):
+            text = f"{left.at(lang.SHIFT)} {sign} {right.at(lang.SHIFT)}"
+            return Value(left.type, text, lang.BITS, calls=max(left.calls, right.calls))
         if right.calls == lang.WRITES:  # which && might not call
             raise RefusedError("a kernel that writes, beside | or &", "name its result first")
         return self._logic(isinstance(op, ast.BitAnd), [left, right])
@@ -317,12 +326,22 @@ class Expressions:
         return chosen((condition, self.translate(node.body), self.translate(node.orelse)))
 
     def _call(self, node: ast.Call) -> Value:
+        if isinstance(node.func, ast.Attribute) and node.func.attr == "reshape":
+            return self._flattened(node)
         function = self.translate(node.func)
         known = function.type.value if isinstance(function.type, Known) else None
         if node.keywords or any(isinstance(a, ast.Starred) for a in node.args):
             raise RefusedError("a call with keywords or a star", "give arguments by position")
         arguments = tuple(self.translate(argument) for argument in node.args)
         lang.check_order(arguments)
+        if known is np.zeros and [a.type for a in arguments[1:]] == [Known(np.uint64)]:
+            return Value(ArrayOf((self._place(node.args[0]),), lang.UINT, True), "{0}")
+        if known is math.frexp and arguments[0].text.isidentifier():
+            number = arguments[0].text
+            texts = f"py_mantissa({number}), py_exponent({number})"
+            kind = lang.TupleOf((lang.FLOAT, lang.INT))
+            name = self.program.tuple_name(kind)
+            return Value(kind, self.program.target.tuple_of(name, texts, False), lang.POSTFIX)
         if known is len:
             return self.length(arguments[0])
         try:
@@ -338,3 +357,12 @@ class Expressions:
             )
         call: Value = self.program.call(body, arguments, self)
         return call
+
+    def _flattened(self, node: ast.Call) -> Value:
+        assert isinstance(node.func, ast.Attribute)
+        array = self.translate(node.func.value)
+        if ast.unparse(node.args[0]) != "-1" or not isinstance(array.type, ArrayOf):
+            raise RefusedError("this reshape()", "only reshape(-1) of an array is allowed")
+        first = "[0]" * (len(array.type.shape) - 1)
+        text = f"(&{array.at(lang.POSTFIX)}{first}[0])" if first else array.text
+        return replace(array, type=ArrayOf((math.prod(array.type.shape),)), text=text)

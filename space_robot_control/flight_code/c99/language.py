@@ -52,7 +52,7 @@ class Scalar:
     """In C."""
 
 
-FLOAT, INT, BOOL, VOID = (Scalar(name) for name in ("double", "int64_t", "bool", "void"))
+FLOAT, INT, UINT, BOOL, VOID = map(Scalar, ("double", "int64_t", "uint64_t", "bool", "void"))
 
 
 @dataclass(frozen=True)
@@ -69,10 +69,15 @@ class TupleOf:
 
 @dataclass(frozen=True)
 class ArrayOf:
-    """An array of floats."""
+    """An array of numbers of one type."""
 
     shape: tuple[int | None, ...]
     """Only the first dimension may be unknown."""
+    item: Scalar = FLOAT
+    is_local: bool = False
+    """Whether it is a function's own, made with ``np.zeros``."""
+    is_table: bool = False
+    """Whether its numbers are constant."""
 
 
 @dataclass(frozen=True)
@@ -184,6 +189,9 @@ class C99:
     shared_function = ""
     """Before that of any other one."""
 
+    table = "static const double"
+    """Before the name of a table of numbers."""
+
     def tuple_of(self, name: str, items: str, is_uniform: bool) -> str:
         """Return a value of the struct ``name`` that stands for a tuple."""
         return f"({name}){{{{{items}}}}}" if is_uniform else f"({name}){{{items}}}"
@@ -193,6 +201,8 @@ def literal(number: float) -> str:
     """Return a number in C, with all its bits."""
     if isinstance(number, bool):
         return "true" if number else "false"
+    if isinstance(number, np.uint64):
+        return f"UINT64_C({number})"
     if isinstance(number, int):
         return str(number) if abs(number) < 2**31 else f"INT64_C({number})"
     if math.isnan(number):
@@ -205,7 +215,8 @@ def literal(number: float) -> str:
 
 def number_of(number: Any) -> Value:
     """Return the value of a number."""
-    kind = BOOL if isinstance(number, bool) else INT if isinstance(number, int) else FLOAT
+    kinds = {bool: BOOL, int: INT, np.uint64: UINT}
+    kind = kinds.get(type(number), FLOAT)
     text = literal(number)
     return Value(kind, text, UNARY if text.startswith(("-", "(")) else ATOM, number)
 
@@ -232,7 +243,11 @@ def cast(value: Value, kind: Type) -> Value:
         text = f"(double){value.at(UNARY)}"
         number = None if constant is None else float(constant)
         return replace(value, type=FLOAT, text=text, rank=UNARY, constant=number)
-    if kind in (FLOAT, INT) and value.type == BOOL:
+    if {kind, value.type} == {INT, UINT}:  # by a word, see `WORDS`: Python has no other way
+        if constant is not None:
+            return number_of(np.uint64(constant) if kind == UINT else int(constant))
+        return replace(value, type=kind, text=f"({kind.name}){value.at(UNARY)}", rank=UNARY)
+    if kind in (FLOAT, INT, UINT) and value.type == BOOL:
         one, zero = ("1.0", "0.0") if kind == FLOAT else ("1", "0")
         number = None if constant is None else float(constant) if kind == FLOAT else int(constant)
         text = f"{value.at(UNARY)} ? {one} : {zero}"
@@ -265,7 +280,12 @@ def joined(one: Type, other: Type) -> Type:
 def described(kind: Type) -> str:
     """Return a type in words."""
     if isinstance(kind, Scalar):
-        words = {"double": "a float", "int64_t": "an integer", "bool": "a bool"}
+        words = {
+            "double": "a float",
+            "int64_t": "an integer",
+            "uint64_t": "an unsigned integer",
+            "bool": "a bool",
+        }
         return words.get(kind.name, "nothing")
     if isinstance(kind, Known):
         return f"the Python object {getattr(kind.value, '__name__', kind.value)!r}"
@@ -346,10 +366,15 @@ WORDS: dict[Any, Word] = {
     int: _integer,
     float: lambda a: cast(a[0], FLOAT),
     bool: lambda a: cast(a[0], BOOL),
+    np.uint64: lambda a: cast(a[0], UINT),
+    np.int64: lambda a: cast(a[0], INT),
     math.sqrt: _exact("sqrt"),
     np.sqrt: _exact("sqrt"),
     np.floor: _exact("floor"),
     np.fmod: _exact("fmod"),
+    math.ldexp: lambda a: replace(
+        _exact("py_ldexp")(a[:1]), text=f"py_ldexp({a[0].text}, {cast(a[1], INT).text})"
+    ),
     math.copysign: _exact("copysign"),
     np.copysign: _exact("copysign"),
     np.sign: _exact("py_sign"),
@@ -362,5 +387,6 @@ WORDS: dict[Any, Word] = {
     lanes.any_lane: lambda a: cast(a[0], BOOL),
     lanes.all_lanes: lambda a: cast(a[0], BOOL),
     lanes.negated: negated,
+    lanes.lane_of: lambda a: a[0],
 }
 """Functions that kernels may call beside one another."""

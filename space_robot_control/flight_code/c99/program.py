@@ -90,7 +90,8 @@ def translated(
         types, result = dict(translation.types), translation.result
     written = set(translation.written)
     for value in translation.names.values():
-        if isinstance(value.type, ArrayOf) and len(value.type.shape) > 1:
+        kind = value.type
+        if isinstance(kind, ArrayOf) and len(kind.shape) > 1 and not kind.is_table:
             written |= value.roots  # C99 cannot pass variable rows as constant ones
     declarations = {
         name: program.declaration(kind, name, name in written)
@@ -182,7 +183,8 @@ class Constant(NamedTuple):
     """A named number."""
 
     name: str
-    number: float
+    number: Any
+    """Or a table of numbers, a tuple of tuples."""
 
 
 class KernelProgram:
@@ -193,14 +195,20 @@ class KernelProgram:
     """
 
     def __init__(
-        self, sizes: Mapping[str, int], joints: int, target: lang.C99 | None = None
+        self,
+        sizes: Mapping[str, int],
+        joints: int,
+        target: lang.C99 | None = None,
+        instead: Mapping[Any, Any] | None = None,
     ) -> None:
         """Begin, for n joints, of which the shapes of records are functions.
 
         ``sizes`` stand for constants of modules by name, as capacities of arrays; ``target`` is the
-        language that is written, C99 if none is given.
+        language that is written, C99 if none is given; ``instead`` has the kernels that stand for
+        others, those that compute in lanes.
         """
         self.sizes, self.joints, self.target = dict(sizes), joints, target or lang.C99()
+        self.instead = {key.py_func: value.py_func for key, value in (instead or {}).items()}
         self.constants: dict[lang.FieldName, float] = {}
         """Fields that never change; of an array, all of its numbers are the same."""
         self.functions: list[Function] = []
@@ -262,6 +270,8 @@ class KernelProgram:
         const = "" if is_written else "const "
         if isinstance(kind, (Pointer, lang.BlockOf)):
             return f"{const}{self.struct_name(kind.record)} *{name}"
+        if isinstance(kind, ArrayOf) and kind.is_local:
+            return f"{kind.item.name} {name}[{kind.shape[0]}]"
         if isinstance(kind, ArrayOf) and len(kind.shape) == 1:
             return f"{const}double *{name}"
         if isinstance(kind, ArrayOf):
@@ -276,7 +286,8 @@ class KernelProgram:
             return self.declaration(kind, parameter.name, parameter.is_written)
         first, *rest = ("" if size is None else size for size in kind.shape)
         # C99 cannot pass variable rows as constant ones
-        const = "const " if not rest and not parameter.is_written else ""
+        is_constant = not parameter.is_written and (not rest or kind.is_table)
+        const = "const " if is_constant else ""
         sizes = "".join(f"[{size}]" for size in rest)
         return f"{const}double {parameter.name}[{first}]{sizes}"
 
@@ -297,6 +308,7 @@ class KernelProgram:
 
         Translations that differ only in the lengths of arrays that they do not read are one.
         """
+        body = self.instead.get(body, body)
         tree, file = parse_body(body)
         if len(tree.args.args) != len(arguments):
             raise RefusedError(f"a call of {tree.name}() without all arguments", "give them all")

@@ -153,6 +153,10 @@ class Statements(Expressions):
     def _assign_together(self, target: ast.Tuple, source: ast.expr) -> None:
         if not isinstance(source, ast.Tuple):
             value = self.translate(source)
+            if isinstance(value.type, ArrayOf):
+                for k, part in enumerate(target.elts):
+                    self._assign(part, self.element(value, number_of(k)))
+                return
             if not isinstance(value.type, lang.TupleOf):
                 raise RefusedError(f"unpacking {lang.described(value.type)}", "return tuples")
             name = value.text
@@ -190,7 +194,7 @@ class Statements(Expressions):
         if isinstance(kind, Known):
             self.names[name] = value
             return
-        if kind in (lang.FLOAT, lang.INT, lang.BOOL):
+        if isinstance(kind, lang.Scalar):
             value = cast(value, kind)
         is_once = self.assigned[name] == 1 and name not in self.own
         known = value.constant if is_once and kind in (lang.FLOAT, lang.INT, lang.BOOL) else None
@@ -216,7 +220,7 @@ class Statements(Expressions):
     def _store(self, place: Value, value: Value) -> None:
         self.write(place)
         if not isinstance(place.type, ArrayOf):
-            self.emit(f"{place.text} = {cast(value, lang.FLOAT).text};")
+            self.emit(f"{place.text} = {cast(value, place.type).text};")
             return
         if isinstance(value.type, ArrayOf) and place.type.shape[0] is None:
             place = replace(place, type=value.type)
@@ -361,7 +365,7 @@ class Statements(Expressions):
             return True
         value = self.translate(node.value)
         self.result = lang.joined(self.result, value.type)
-        if self.result in (lang.FLOAT, lang.INT, lang.BOOL):
+        if isinstance(self.result, lang.Scalar):
             value = cast(value, self.result)
         elif not isinstance(value.type, lang.TupleOf):
             raise RefusedError(f"returning {lang.described(value.type)}", "write into an argument")
@@ -414,7 +418,7 @@ def assigned_in(tree: ast.FunctionDef) -> Counter[str]:
     inside: Counter[str] = Counter()
     for loop in (n for n in ast.walk(tree) if isinstance(n, ast.For)):
         for name in names_in([loop.target]):
-            if name in names_in(loop.body, stored=True):
+            if name in names_in(loop.body, stored=True) and name != "_":
                 raise RefusedError(f"{name!r} set beside its loop", "use another name")
             inside[name] += names_in([loop])[name]
     mentioned = names_in([tree])
