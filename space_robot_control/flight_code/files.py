@@ -115,8 +115,20 @@ class Files:
         }
         for record in whole:
             self.fields |= {lang.FieldName(record, name) for name in record.fields()}
+        for record, name in list(self.fields):
+            declared = record.fields()[name]
+            if not isinstance(declared, RecordField) and not self.has(record, name):
+                self.fields.add(self._some_field(declared))  # a struct is never empty
         self._names = self._function_names()
         self._constants = self._constant_names()
+
+    def _some_field(self, record: type[Record]) -> lang.FieldName:
+        for name, declared in record.fields().items():
+            if not isinstance(declared, RecordField):
+                return self._some_field(declared)
+            if 0 not in self.program.shape(record, name):
+                return lang.FieldName(record, name)
+        raise AssertionError(record)
 
     def has(self, record: type[Record], name: str) -> bool:
         """Return whether a field is part of the exported struct."""

@@ -98,19 +98,7 @@ class FlightSoftware:
     @cached_property
     def sizes(self) -> dict[str, int]:
         """Capacities of arrays in C, in place of those in Python: exactly what is needed."""
-        names, memory = self.controller.names, self.controller.block[0]
-        wheels, ring = len(names.wheels), SMALLEST_RING
-        while ring < memory.navigation.attitude.delay + 2:
-            ring *= 2
-        return {
-            "MOST_JOINTS": int(memory.signals.model.joint_count),
-            "MOST_WHEELS": wheels,
-            "MOST_PAIRS": wheels * (wheels - 1) // 2,
-            "MOST_THRUSTERS": len(names.thrusters),
-            "MOST_TORQUERS": len(names.torquers),
-            "MOST_ACTUATORS": len(names.actuators),
-            "RING": ring,
-        }
+        return controller_sizes(self.controller)
 
     @cached_property
     def parts(self) -> list[Part]:
@@ -176,27 +164,27 @@ def _program(
     program = KernelProgram(software.sizes, software.joints)
     program.constants = constants
     supervision, controller, state, reference = (
-        _value(lang.BlockOf(record)) for record in (Supervision, ControllerMemory, State, Reference)
+        argument(lang.BlockOf(record)) for record in (Supervision, ControllerMemory, State, Reference)
     )
-    tick, period = _value(lang.INT), _value(lang.FLOAT)
+    tick, period = argument(lang.INT), argument(lang.FLOAT)
     has_actuators = bool(software.controller.names.actuators)
-    how = _value(lang.Known(allocate if has_actuators else leave_alone))
+    how = argument(lang.Known(allocate if has_actuators else leave_alone))
     calls: dict[str, tuple[Any, tuple[lang.Value, ...]]] = {
         "judge": (judge_stamp, (supervision, tick)),
         "takes_over": (takes_over, (supervision, tick)),
         "engage": (engage, (controller,)),
     }
     if wheels := software.sizes["MOST_WHEELS"]:
-        axis = _value(lang.ArrayOf((wheels, 3)))
-        calls["tabulate"] = (tabulate, (_value(lang.Pointer(WheelSet)), axis, tick))
+        axis = argument(lang.ArrayOf((wheels, 3)))
+        calls["tabulate"] = (tabulate, (argument(lang.Pointer(WheelSet)), axis, tick))
     if software.swaps:
-        ticks = _value(lang.ArrayOf((len(software.swaps),)))
+        ticks = argument(lang.ArrayOf((len(software.swaps),)))
         calls["swaps_due"] = (swaps_due, (ticks, tick, tick))
     for law in software.laws:
         inputs = how, tick, state, reference, period
         calls[f"answer_state {law.name}"] = (
             answer_state,
-            (supervision, controller, _law(law), *inputs),
+            (supervision, controller, law_argument(law), *inputs),
         )
     numbers = {
         name: program.function(kernel.py_func, arguments)
@@ -205,11 +193,13 @@ def _program(
     return program, {name: program.functions[number] for name, number in numbers.items()}
 
 
-def _value(kind: lang.Type) -> lang.Value:
+def argument(kind: lang.Type) -> lang.Value:
+    """Return an argument of a type, whose value nobody knows."""
     return lang.Value(kind, "argument")
 
 
-def _law(law: CompiledLaw) -> lang.Value:
+def law_argument(law: CompiledLaw) -> lang.Value:
+    """Return the argument ``law`` of kernels: a `LawCode` whose functions are bound."""
     own = type(law)
     items = {
         "run": lang.Known(own.kernel),
@@ -220,7 +210,24 @@ def _law(law: CompiledLaw) -> lang.Value:
         "uses_model": lang.Known(law.needs_model),
         "adds_inertia": lang.Known(law.adds_inertia),
     }
-    return _value(lang.Bundle(law.name, tuple(items.items())))
+    return argument(lang.Bundle(law.name, tuple(items.items())))
+
+
+def controller_sizes(controller: Controller) -> dict[str, int]:
+    """Return the capacities of arrays that a controller needs, by the constants' names."""
+    names, memory = controller.names, controller.block[0]
+    wheels, ring = len(names.wheels), SMALLEST_RING
+    while ring < memory.navigation.attitude.delay + 2:
+        ring *= 2
+    return {
+        "MOST_JOINTS": int(memory.signals.model.joint_count),
+        "MOST_WHEELS": wheels,
+        "MOST_PAIRS": wheels * (wheels - 1) // 2,
+        "MOST_THRUSTERS": len(names.thrusters),
+        "MOST_TORQUERS": len(names.torquers),
+        "MOST_ACTUATORS": len(names.actuators),
+        "RING": ring,
+    }
 
 
 def constant_fields(

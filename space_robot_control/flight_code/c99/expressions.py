@@ -129,6 +129,7 @@ class Expressions:
         if declared is None:
             raise RefusedError(f"attribute {name!r} of {record.__name__}", "declare it as a field")
         field = lang.FieldName(record, name)
+        self.program.records[id(record)] = record
         arrow = "->" if owner.is_pointer else "."
         text = f"{owner.at(lang.POSTFIX)}{arrow}«{id(record)}:{name}»"
         if not isinstance(declared, RecordField):

@@ -176,7 +176,7 @@ class Statements(Expressions):
             loads = values[k].calls or "[" in values[k].text or "->" in values[k].text
             touched = bool(mentioned & set(written)) or (stores and loads)
             if touched and not isinstance(values[k].type, (Pointer, ArrayOf)):
-                values[k] = self._named("new", values[k])
+                values[k] = self._named("later", values[k])
         for part, value in zip(target.elts, values, strict=True):
             self._assign(part, value)
 

@@ -1,0 +1,50 @@
+"""A device that runs a program of CUDA C++, and its memory."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from typing import Any
+
+from numpy.typing import NDArray
+
+
+class Memory(ABC):
+    """An array on a device."""
+
+    pointer: int
+    """Address, as the program has it."""
+
+    @abstractmethod
+    def read(self) -> NDArray[Any]:
+        """Return the numbers."""
+
+    @abstractmethod
+    def write(self, array: NDArray[Any], first: int = 0) -> None:
+        """Overwrite elements from ``first`` on."""
+
+
+class Program(ABC):
+    """A compiled program."""
+
+    @abstractmethod
+    def run(self, function: str, count: int, argument: Memory) -> None:
+        """Run a function of the program, one thread for each of ``count``, and wait for it."""
+
+
+class Device(ABC):
+    """Where flights are flown."""
+
+    name: str
+
+    @abstractmethod
+    def compile(self, text: str) -> Program:
+        """Compile a program, or take it from the cache."""
+
+    @abstractmethod
+    def store(self, array: NDArray[Any]) -> Memory:
+        """Return a copy of an array on the device."""
+
+    @property
+    @abstractmethod
+    def free_bytes(self) -> int:
+        """Memory that is free."""

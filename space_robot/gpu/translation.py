@@ -1,0 +1,177 @@
+"""The closed loop of flights as a program of CUDA C++, translated from their kernels.
+
+The text is C++ for any processor, too: where no CUDA compiler reads it, a loop over the flights
+stands for the threads.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+import jinja2
+import numpy as np
+from numpy.typing import NDArray
+
+from space_robot_control.allocation.allocation import allocate, leave_alone
+from space_robot_control.controller.signals import ControllerMemory
+from space_robot_control.controller.tick import controller_tick, engage
+from space_robot_control.flight_code.c99 import language as lang
+from space_robot_control.flight_code.c99.program import Function, KernelProgram
+from space_robot_control.flight_code.files import Files, reachable
+from space_robot_control.flight_code.software import (
+    argument,
+    constant_fields,
+    controller_sizes,
+    law_argument,
+)
+from space_robot_control.laws.base import CompiledLaw
+from space_robot_model.elementary.normal import normal_numbers, normal_numbers_of_one
+from space_robot_msgs_py.compiled.records import Record
+from space_robot_msgs_py.samples import Reference, State
+from space_robot_sim.plant.tick import PlantMemory, advance, measure
+
+from ..flight.plan import Flight
+
+Call = tuple[Any, tuple[lang.Value, ...]]
+"""A kernel and its arguments."""
+Parts = Mapping[type[Record], NDArray[Any]]
+"""Blocks (F,) of the flights' records, by kind."""
+LARGE = (PlantMemory, ControllerMemory)
+"""Records whose numbers may be known; gains are not, so that other gains need no other program."""
+
+
+class Cuda(lang.C99):
+    """What of the text is C++'s own."""
+
+    local_function = shared_function = "static __device__ "
+    table = "static __device__ const double"
+
+    def tuple_of(self, name: str, items: str, is_uniform: bool) -> str:
+        """Return a value of the struct ``name`` that stands for a tuple."""
+        return f"{name}{{{{{items}}}}}" if is_uniform else f"{name}{{{items}}}"
+
+
+class Translation:
+    """Kernels in C++, for records whose numbers are known where all of them are the same."""
+
+    def __init__(
+        self,
+        calls: Mapping[str, Call],
+        parts: Parts,
+        sizes: Mapping[str, int],
+        joints: int,
+        varying: Iterable[lang.FieldName] = (),
+        kept: Iterable[lang.FieldName] = (),
+    ) -> None:
+        """Translate kernels, and all that they call.
+
+        Numbers that no kernel writes are known if they make the shape of a flight (they are
+        ``uniform``) or say what it has not (they are 0). What is written is found by assuming
+        first that nothing is: what only a branch writes that is never taken does not count.
+
+        Args:
+            calls: kernels by name.
+            parts: memory before the first tick.
+            sizes: capacities of arrays, by the constants' names.
+            joints: n.
+            varying: fields that may change between kernels, though they are the same now.
+            kept: fields that structs have though no kernel reads them.
+        """
+        self._written = set(varying)
+        while True:
+            self.program = KernelProgram(
+                sizes, joints, Cuda(), {normal_numbers: normal_numbers_of_one}
+            )
+            self.program.constants = self.constants = self.constants_of(parts)
+            numbers = {
+                name: self.program.function(kernel.py_func, arguments)
+                for name, (kernel, arguments) in calls.items()
+            }
+            self.roots = {name: self.program.functions[k] for name, k in numbers.items()}
+            reached = reachable(self.program, self.roots.values())
+            more = {field for function in reached for field in function.stores} - self._written
+            if not more:
+                break
+            self._written |= more
+        whole = [State, Reference, *(record for record in parts if record not in LARGE)]
+        self.files = Files(self.program, list(self.roots.values()), whole, lambda module: "loop")
+        self.files.fields |= set(kept)
+        self._records = list(parts)
+
+    def constants_of(self, parts: Parts) -> dict[lang.FieldName, float]:
+        """Return the fields that are known, of memory between two stretches."""
+        blocks = [(record, block) for record, block in parts.items() if record in LARGE]
+        found = constant_fields(self.program, blocks, self._written)
+        zero = np.float64(0.0).tobytes()
+        return {
+            field: number
+            for field, number in found.items()
+            if field.record.fields()[field.name].uniform or np.float64(number).tobytes() == zero
+        }
+
+    def call(self, root: str, given: Mapping[str, str]) -> str:
+        """Return the text that calls a kernel with texts by the names of its parameters."""
+        function: Function = self.roots[root]
+        texts = ", ".join(given[parameter.name] for parameter in function.parameters)
+        return f"{self.files.name_of(function)}({texts})"
+
+    def render(self, template: str, **content: Any) -> str:
+        """Return the whole text: what is translated, and the loop of a template around it."""
+        environment = jinja2.Environment(
+            loader=jinja2.ChoiceLoader(
+                [
+                    jinja2.PackageLoader("space_robot.gpu"),
+                    jinja2.PackageLoader("space_robot_control.flight_code"),
+                ]
+            ),
+            keep_trailing_newline=True,
+            autoescape=False,
+        )
+        return environment.get_template(template).render(
+            structs=self.files.structs([*self._records, State, Reference]),
+            constants=self.files.constants(),
+            tuples=self.files.tuples(),
+            prototypes=self.files.final(self.files.prototypes()),
+            functions="".join(self.files.rooms().values()),
+            struct_of=self.program.struct_name,
+            **content,
+        )
+
+
+def sizes_of(flight: Flight) -> dict[str, int]:
+    """Return the capacities of arrays that a flight needs."""
+    model, wheels = flight.plant.memory.model, len(flight.plant.names.wheels)
+    joints, rotors = int(model.joint_count), int(model.rotor_count)
+    sizes = controller_sizes(flight.controller)
+    sizes["MOST_JOINTS"] = joints = max(joints, sizes["MOST_JOINTS"])
+    return {
+        **sizes,
+        "MOST_MOVING": joints + wheels + rotors,
+        "MOST_NUMBERS": 13 + 2 * joints + wheels + 2 * rotors + 6,
+        "MOST_PASSIVE": len(flight.plant.names.passive),
+    }
+
+
+def loop_calls(flight: Flight, laws: Sequence[CompiledLaw]) -> dict[str, Call]:
+    """Return the kernels of the closed loop; ``laws`` are all that may be in force."""
+    tick, period = argument(lang.INT), argument(lang.FLOAT)
+    names, rows = flight.plant.names, len(flight.plant.command_delay_buffer)
+    torque = argument(lang.ArrayOf((len(names.commanded),)))
+    buffer = argument(lang.ArrayOf((rows, len(names.commanded))))
+    controller = argument(lang.BlockOf(ControllerMemory))
+    states, references = argument(lang.BlockOf(State)), argument(lang.BlockOf(Reference))
+    how = argument(lang.Known(allocate if names.actuators else leave_alone))
+    inputs = tick, states, references, torque, period
+    return {
+        "measure": (measure, (argument(lang.BlockOf(PlantMemory)), tick, period)),
+        "advance": (
+            advance,
+            (argument(lang.Pointer(PlantMemory)), buffer, torque, tick, period),
+        ),
+        "engage": (engage, (controller,)),
+        **{
+            f"tick_{law.name}": (controller_tick, (controller, law_argument(law), how, *inputs))
+            for law in laws
+        },
+    }
