@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 from space_robot_control.controller.controller import unusable
 from space_robot_control.controller.law_choice import LawChoice
 from space_robot_control.controller.signals import USABLE, ControllerMemory
+from space_robot_control.laws import ControlLaw
 from space_robot_control.laws.base import CompiledLaw
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.compiled.lanes import WIDTH
@@ -33,15 +34,18 @@ def batch_obstacle(flight: Flight) -> str:
         return "the flight code in C answers"
     for law in (flight.law, *(law for _, law in flight.swaps)):
         kind: Any = type(law)  # classes are hashable
-        if why := _law_obstacle(kind):
+        if why := plain_law_obstacle(kind) or _lanes_obstacle(kind):
             return why
     return ""
 
 
+def plain_law_obstacle(law: type[ControlLaw]) -> str:
+    """Return why a law has no kernel, in a line; empty if it has one."""
+    return "" if issubclass(law, CompiledLaw) else f"law {law.name!r} is plain Python"
+
+
 @cache
-def _law_obstacle(law: Any) -> str:
-    if not issubclass(law, CompiledLaw):
-        return f"law {law.name!r} is plain Python"
+def _lanes_obstacle(law: type[CompiledLaw]) -> str:
     try:
         law.function(WIDTH)
     except InputError as error:
@@ -75,8 +79,10 @@ def plant_key(plant: Plant) -> Hashable:
     )
 
 
-def batches(flights: Iterable[tuple[int, Flight]]) -> Iterator[list[tuple[int, Flight]]]:
-    """Yield numbered flights in groups of up to eight that fly together, as soon as one is full.
+def batches(
+    flights: Iterable[tuple[int, Flight]], most: int = WIDTH
+) -> Iterator[list[tuple[int, Flight]]]:
+    """Yield numbered flights in groups of up to ``most`` that fly together, when one is full.
 
     A flight that cannot be in a batch, or has no other to share one with, is a group by itself.
     """
@@ -88,7 +94,7 @@ def batches(flights: Iterable[tuple[int, Flight]]) -> Iterator[list[tuple[int, F
         key = batch_key(flight)
         group = waiting.setdefault(key, [])
         group.append((number, flight))
-        if len(group) == WIDTH:
+        if len(group) == most:
             yield waiting.pop(key)
     yield from waiting.values()
 

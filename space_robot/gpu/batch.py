@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
@@ -32,6 +33,8 @@ Array = NDArray[np.float64]
 
 LOG_BYTES = 1 << 30
 """Of the part of all logs that is on the device at a time."""
+REHEARSED = 32
+"""Flights whose events are rehearsed."""
 MOST_STRETCH = 4000
 """Ticks between two reports of progress."""
 
@@ -98,11 +101,21 @@ class DeviceBatch:
         self._varying: set[FieldName] = set()
         self._plants = np.concatenate([flight.plant.block for flight in self.flights])
         self._controllers = np.concatenate([flight.controller.block for flight in self.flights])
+        self._rehearse()
         self._translate()
-        self._store()
+
+    @property
+    def device_bytes(self) -> int:
+        """Memory that the flights need on the device, without their log."""
+        files, parts = self.translation.files, self._parts()
+        structs = sum(len(block) * files.dtype(record).itemsize for record, block in parts.items())
+        missions = {id(flight.mission) for flight in self.flights}
+        rows = len(missions) * self.flights[0].ticks
+        return structs + rows * files.dtype(Reference).itemsize
 
     def fly(self, progress: Callable[[int], object] = lambda tick: None) -> list[FlownInBatch]:
         """Fly every tick; return the flights as they ended."""
+        self._store()
         rows = max(1, LOG_BYTES // (8 * self._row * len(self.flights)))
         for start, stop in self.flights[0].stretches(min(rows, MOST_STRETCH)):
             progress(start)
@@ -110,7 +123,8 @@ class DeviceBatch:
             self._fly_to(start, stop)
             self._keep_rows(start, stop)
         progress(self.flights[0].ticks)
-        self._plant_memory.read()
+        unpack(self._plant_memory.read(), self._plants)
+        self._flies, self._ticks = self._whole["flies"].read(), self._whole["ticks"].read()
         return [self._flown(k) for k in range(len(self.flights))]
 
     # program and memory
@@ -119,7 +133,7 @@ class DeviceBatch:
         first, parts = self.flights[0], self._parts()
         translation = Translation(
             loop_calls(first, [*self._laws.values()]),
-            parts,
+            {**parts, PlantMemory: np.concatenate([self._plants, self._events])},
             sizes_of(first),
             first.robot.n,
             self._varying,
@@ -127,7 +141,6 @@ class DeviceBatch:
         )
         self.translation = translation
         self.text = translation.render("loop.cu.j2", **self._content(translation))
-        self._program = self._device.compile(self.text)
 
     def _parts(self) -> Parts:
         parts: dict[type[Record], NDArray[Any]] = {
@@ -191,7 +204,20 @@ class DeviceBatch:
             "engage": translation.call("engage", loop),
         }
 
+    def _rehearse(self) -> None:
+        """Let the events of some flights happen on copies, to see which numbers they change."""
+        eventful = [f for f in self.flights if f.plant.next_change < f.ticks][:REHEARSED]
+        after: list[NDArray[Any]] = []
+        for flight in eventful:
+            plant = copy.deepcopy(flight.plant)
+            while plant.next_change < flight.ticks:
+                plant.change(int(plant.next_change))
+                after.append(plant.block.copy())
+        self._events = np.concatenate([*after, self._plants[:1]])
+
     def _store(self) -> None:
+        """Copy the flights' memory to the device, and compile the program."""
+        self._program = self._device.compile(self.text)
         count, device, files = len(self.flights), self._device, self.translation.files
         store = device.store
         self._memories = {
@@ -268,11 +294,11 @@ class DeviceBatch:
         waiting = np.flatnonzero((flies != 0) & (ticks == until) & (ticks < self.flights[0].ticks))
         if not len(waiting):
             return False
-        structs = self._plant_memory.read()
+        unpack(self._plant_memory.read(), self._plants)
         has_measured = self._whole["has_measured"].read()
         for k in waiting:
             flight = self.flights[k]
-            unpack(structs[k : k + 1], flight.plant.block)
+            flight.plant.block[:] = self._plants[k : k + 1]
             flight.plant.change(int(ticks[k]))
             has_measured[k] = 0
             self._plants[k : k + 1] = flight.plant.block
@@ -296,26 +322,12 @@ class DeviceBatch:
             self._move_to_new_structs()
 
     def _move_to_new_structs(self) -> None:
-        old, files = self._memories, self.translation.files
-        for record, blocks in (
-            (PlantMemory, self._plants),
-            (ControllerMemory, self._controllers),
-        ):
-            unpack(old[record].read(), blocks)
-        laws = {
-            record: memory.read()
-            for record, memory in old.items()
-            if record not in (PlantMemory, ControllerMemory)
-        }
+        unpack(self._memories[ControllerMemory].read(), self._controllers)
         self._translate()
-        files = self.translation.files
-        self._memories = {
-            record: self._device.store(packed(blocks, files.dtype(record)))
-            for record, blocks in (
-                (PlantMemory, self._plants),
-                (ControllerMemory, self._controllers),
-            )
-        } | {record: self._device.store(structs) for record, structs in laws.items()}
+        self._program = self._device.compile(self.text)
+        for record, blocks in ((PlantMemory, self._plants), (ControllerMemory, self._controllers)):
+            dtype = self.translation.files.dtype(record)
+            self._memories[record] = self._device.store(packed(blocks, dtype))
         self._plant_memory = self._memories[PlantMemory]
 
     def _choose_laws(self, tick: int) -> None:
@@ -358,21 +370,19 @@ class DeviceBatch:
 
     def _flown(self, k: int) -> FlownInBatch:
         flight, log = self.flights[k], self.logs[k]
-        flies, ticks = self._whole["flies"].read(), self._whole["ticks"].read()
-        if flies[k]:
+        plant, reached = flight.plant, int(self._ticks[k])
+        plant.block[:] = self._plants[k : k + 1]
+        plant.state.tick = plant.truth.tick = reached
+        if self._flies[k]:
             note_assumed_errors(flight, log, 0, log.ticks)
             return FlownInBatch(k, log, Ending.complete(flight.ticks, flight.period))
-        reached = int(ticks[k])
         note_assumed_errors(flight, log, 0, reached)
         error = self._error(k, reached)
         log = ended_early(log, measured_ticks(flight.plant, error), reached)
         return FlownInBatch(k, log, Ending.early(error, flight.period))
 
     def _error(self, k: int, reached: int) -> FlightError:
-        plant = self.flights[k].plant
-        unpack(self._plant_memory.read()[k : k + 1], plant.block)
-        plant.state.tick = plant.truth.tick = reached
-        status = int(self._whole["statuses"].read()[k])
+        plant, status = self.flights[k].plant, int(self._whole["statuses"].read()[k])
         if status != USABLE:
             return unusable(status, reached, plant.state.quaternion)
         return plant.diverged(float(self._whole["fastest"].read()[k]))

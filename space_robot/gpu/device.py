@@ -1,4 +1,4 @@
-"""A device that runs a program of CUDA C++, and its memory."""
+"""A device that runs programs of CUDA C++, and its memory."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ from numpy.typing import NDArray
 
 
 class Memory(ABC):
-    """An array on a device."""
+    """An array on a device; it is freed with this object."""
 
     pointer: int
-    """Address, as the program has it."""
+    """Its address for programs."""
 
     @abstractmethod
     def read(self) -> NDArray[Any]:
@@ -20,7 +20,7 @@ class Memory(ABC):
 
     @abstractmethod
     def write(self, array: NDArray[Any], first: int = 0) -> None:
-        """Overwrite elements from ``first`` on."""
+        """Overwrite rows from ``first`` on."""
 
 
 class Program(ABC):
@@ -28,7 +28,7 @@ class Program(ABC):
 
     @abstractmethod
     def run(self, function: str, count: int, argument: Memory) -> None:
-        """Run a function of the program, one thread for each of ``count``, and wait for it."""
+        """Run a function of one argument by ``count`` threads, and wait for all of them."""
 
 
 class Device(ABC):

@@ -58,8 +58,8 @@ def disturbance_observer(signals: Signals, gains: Gains, memory: Memory, period:
         # the reference's step moves rhodot without a force
         last_rate = memory.last_rate[i] + signals.rate_step[i]
         begun = force[i] - inertia * rhodd_d[i] + momentum * rate[i]
-        new = smooth[i] + share * (force[i] + momentum * last_rate - smooth[i])
-        smooth[i] = where(np.isnan(smooth[i]), begun, new)
+        passed = smooth[i] + share * (force[i] + momentum * last_rate - smooth[i])
+        smooth[i] = where(np.isnan(smooth[i]), begun, passed)
         memory.last_rate[i] = rate[i]
         disturbance = smooth[i] - momentum * rate[i]
         # u_PD of (31)

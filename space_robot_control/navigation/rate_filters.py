@@ -73,9 +73,9 @@ def pass_low(low_pass: LowPass, rate: Array, torque: Array) -> None:
 
 
 @subroutine
-def _stepped(last: float, new: float, weight: float) -> float:
+def _stepped(last: float, now: float, weight: float) -> float:
     """Return a stage's next value; with a weight of 1 the new sample itself."""
-    return where(weight == 1.0, new, last + weight * (new - last))
+    return where(weight == 1.0, now, last + weight * (now - last))
 
 
 class JointFilter(Record):

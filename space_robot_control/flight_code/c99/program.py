@@ -284,7 +284,7 @@ class KernelProgram:
         kind = parameter.type
         if not isinstance(kind, ArrayOf):
             return self.declaration(kind, parameter.name, parameter.is_written)
-        first, *rest = ("" if size is None else size for size in kind.shape)
+        first, *rest = (size or "" for size in kind.shape)
         # C99 cannot pass variable rows as constant ones
         is_constant = not parameter.is_written and (not rest or kind.is_table)
         const = "const " if is_constant else ""
