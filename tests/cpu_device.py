@@ -1,4 +1,4 @@
-"""The device's programs compiled as C++ for this processor, where a loop stands for threads."""
+"""The programs of a device compiled as C++ for this processor, where a loop stands for threads."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from space_robot.gpu.device import Device, Memory, Program
 
-FLAGS = ("-std=c++17", "-O1", "-ffp-contract=off", "-fno-tree-vectorize", "-shared", "-fPIC", "-w")
+FLAGS = ("-std=c++17", "-O0", "-ffp-contract=off", "-shared", "-fPIC", "-Werror")
 
 
 class CpuMemory(Memory):
@@ -44,14 +44,23 @@ class CpuDevice(Device):
     """This processor."""
 
     name = "this processor"
-    free_bytes = 8 << 30
+
+    def __init__(self, free_bytes: int = 8 << 30) -> None:
+        self._free_bytes = free_bytes
+        self.texts: list[str] = []
+        """Of the programs that were compiled."""
 
     def compile(self, text: str) -> Program:
+        self.texts.append(text)
         with tempfile.TemporaryDirectory() as folder:
-            source, library = Path(folder) / "loop.cpp", Path(folder) / "loop.so"
+            source, library = Path(folder) / "flights.cpp", Path(folder) / "flights.so"
             source.write_text(text, "utf-8")
             subprocess.run(["g++", *FLAGS, str(source), "-o", str(library)], check=True)
             return CpuProgram(ctypes.CDLL(str(library)))
 
     def store(self, array: NDArray[Any]) -> Memory:
         return CpuMemory(array)
+
+    @property
+    def free_bytes(self) -> int:
+        return self._free_bytes

@@ -6,14 +6,16 @@ import warnings
 from collections.abc import Callable, Iterable, Iterator
 from functools import partial
 
+from space_robot_msgs_py.compiled.lanes import WIDTH
 from space_robot_msgs_py.config.validation import short
 from space_robot_msgs_py.errors import InputError
 
 from ..console.progress import check_progress, rated_progress
-from ..flight.batch import FlightBatch, batches
+from ..flight.batch import FlightBatch, batch_obstacle, batches
 from ..flight.benches import Benches
 from ..flight.compilation import compile_kernels, compile_lanes
 from ..flight.plan import Flight
+from ..gpu.fly import MOST_FLIGHTS, Device, device_named, fly_on_device
 from .flown_flight import FlownFlight, fly_in_process
 from .scenario import FlyableScenario as Scenario
 
@@ -22,6 +24,7 @@ def fly_many(
     scenarios: Iterable[Scenario],
     keep_log: bool = True,
     progress: Callable[[int], object] | bool | None = None,
+    device: str = "cpu",
 ) -> list[FlownFlight]:
     """Fly scenarios in this process, eight at a time where they can share a batch.
 
@@ -35,20 +38,22 @@ def fly_many(
         scenarios: to be flown.
         keep_log: False: only the metrics are kept, for flights too many for memory.
         progress: called with the number of flights that are over; True: a progress line.
+        device: ``gpu``: those that share a batch fly on an NVIDIA device, hundreds at a time.
 
     Returns:
         The flights, in the order of ``scenarios``.
 
     Raises:
-        InputError: a scenario cannot be flown; names its place.
+        InputError: a scenario cannot be flown; names its place. Or there is no such device.
     """
     check_progress(progress)
+    place = device_named(device)
     if progress is True:
         several = list(_several(scenarios))
         with rated_progress("flights") as show:
             shown = partial(show, total=len(several))
-            return _fly_groups(several, keep_log, shown, is_shown_at_start=True)
-    return _fly_groups(scenarios, keep_log, progress or None)
+            return _fly_groups(several, keep_log, shown, place, is_shown_at_start=True)
+    return _fly_groups(scenarios, keep_log, progress or None, place)
 
 
 def bench_many(scenarios: Iterable[Scenario]) -> Benches:
@@ -101,24 +106,26 @@ def _fly_groups(
     scenarios: Iterable[Scenario],
     keep_log: bool,
     progress: Callable[[int], object] | None,
+    device: Device | None,
     is_shown_at_start: bool = False,
 ) -> list[FlownFlight]:
     """Fly scenarios group by group; ``is_shown_at_start``: call ``progress`` with 0, too."""
     flown: dict[int, FlownFlight] = {}
-    for group in batches(_checked(scenarios)):
+    for group in batches(_checked(scenarios), MOST_FLIGHTS if device else WIDTH):
         flights = [flight for _, flight in group]
         compile_kernels(any(flight.plant.names.actuators for flight in flights))
-        if len(flights) > 1:
+        if len(flights) > 1 and device is None:
             compile_lanes()
         # after the compilation, which has a progress line of its own
         if progress and is_shown_at_start and not flown:
             progress(0)
-        if len(flights) == 1:
+        if len(flights) == 1 and (device is None or batch_obstacle(flights[0])):
             over = [fly_in_process(flights[0], keep_log=keep_log)]
         else:
+            ended = fly_on_device(flights, device) if device else FlightBatch(flights).fly()
             over = [
                 FlownFlight(flights[one.flight], one.ending, None, one.log, keep_log)
-                for one in FlightBatch(flights).fly()
+                for one in ended
             ]
         flown |= zip((number for number, _ in group), over, strict=True)
         if progress:

@@ -58,6 +58,13 @@ FOLDER = click.argument("folder", type=click.Path(path_type=Path), metavar="DIR"
     help="Longest wall-clock time of a flight; its row says out_of_time then. Flights with a limit "
     "are flown one by one [default: any].",
 )
+@click.option(
+    "--device",
+    type=click.Choice(["cpu", "gpu"]),
+    default="cpu",
+    show_default=True,
+    help="Where flights fly: gpu is an NVIDIA device, hundreds at a time, with the same rows.",
+)
 @flight_option("json")
 def run(file: str, out: Path | None, as_json: bool, **options: Any) -> None:
     """Fly a campaign into a folder; the same command resumes an interrupted one.
@@ -71,6 +78,7 @@ def run(file: str, out: Path | None, as_json: bool, **options: Any) -> None:
       space-robot campaign run first --runs 200 --seed 7 --out campaigns/a
       space-robot campaign run my.yaml --runs 10000 --out campaigns/b --workers 8 --timeout 60
       space-robot campaign run my.yaml --out campaigns/b --scheduler tcp://cluster:8786
+      space-robot campaign run my.yaml --runs 10000 --out campaigns/c --device gpu
     """
     from ..campaign.flown import Campaign
     from ..console.progress import rated_progress

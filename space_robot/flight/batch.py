@@ -9,7 +9,6 @@ from typing import Any, NamedTuple
 from space_robot_control.controller.controller import unusable
 from space_robot_control.controller.law_choice import LawChoice
 from space_robot_control.controller.signals import USABLE, ControllerMemory
-from space_robot_control.laws import ControlLaw
 from space_robot_control.laws.base import CompiledLaw
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.compiled.lanes import WIDTH
@@ -34,18 +33,15 @@ def batch_obstacle(flight: Flight) -> str:
         return "the flight code in C answers"
     for law in (flight.law, *(law for _, law in flight.swaps)):
         kind: Any = type(law)  # classes are hashable
-        if why := plain_law_obstacle(kind) or _lanes_obstacle(kind):
+        if why := _law_obstacle(kind):
             return why
     return ""
 
 
-def plain_law_obstacle(law: type[ControlLaw]) -> str:
-    """Return why a law has no kernel, in a line; empty if it has one."""
-    return "" if issubclass(law, CompiledLaw) else f"law {law.name!r} is plain Python"
-
-
 @cache
-def _lanes_obstacle(law: type[CompiledLaw]) -> str:
+def _law_obstacle(law: Any) -> str:
+    if not issubclass(law, CompiledLaw):
+        return f"law {law.name!r} is plain Python"
     try:
         law.function(WIDTH)
     except InputError as error:

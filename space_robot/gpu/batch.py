@@ -140,6 +140,8 @@ class DeviceBatch:
             [FieldName(Signals, "n_hat"), FieldName(Signals, "error")],
         )
         self.translation = translation
+        of_plants = translation.constants_of({PlantMemory: self._plants})
+        self._of_plants = of_plants.keys() & translation.constants.keys()
         self.text = translation.render("loop.cu.j2", **self._content(translation))
 
     def _parts(self) -> Parts:
@@ -302,7 +304,7 @@ class DeviceBatch:
             flight.plant.change(int(ticks[k]))
             has_measured[k] = 0
             self._plants[k : k + 1] = flight.plant.block
-        self._check_constants()
+        self._check_constants(self._plants[waiting])
         dtype = self.translation.files.dtype(PlantMemory)
         for k in waiting:
             self._plant_memory.write(packed(self._plants[k : k + 1], dtype), int(k))
@@ -310,14 +312,11 @@ class DeviceBatch:
         self._whole["has_measured"].write(has_measured)
         return bool(np.any(ticks[waiting] < stop))
 
-    def _check_constants(self) -> None:
+    def _check_constants(self, plants: NDArray[Any]) -> None:
         """Translate anew if an event has changed numbers that the program takes for constant."""
-        changed = {
-            field
-            for field in self.translation.constants
-            if field not in self.translation.constants_of(self._parts())
-        }
-        if changed:
+        now = self.translation.constants_of({PlantMemory: plants})
+        known = self.translation.constants
+        if changed := {field for field in self._of_plants if now.get(field) != known[field]}:
             self._varying |= changed
             self._move_to_new_structs()
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import ctypes
 import hashlib
 import weakref
+from collections.abc import Sequence
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -40,9 +41,9 @@ def find_device() -> Device:
     try:
         from cuda.bindings import driver  # type: ignore[import-not-found,unused-ignore]
         from cuda.bindings import nvrtc  # noqa: F401
-    except ImportError as error:
-        missing = f"{error.name or 'cuda-bindings'} is not installed"
-        raise InputError(f"device gpu: {missing}: {install_command('gpu')}") from None
+    except ImportError:
+        how = install_command("gpu")
+        raise InputError(f"device gpu: cuda-bindings is not installed: {how}") from None
     try:
         _checked(driver.cuInit(0))
         return CudaDevice(_checked(driver.cuDeviceGet(0)))
@@ -177,7 +178,7 @@ def program_file(text: str, architecture: str) -> Path:
     return cache_directory() / "gpu" / f"{digest.hexdigest()[:32]}.cubin"
 
 
-def compiled(text: str, architecture: str) -> bytes:
+def compiled(text: str, architecture: str, flags: Sequence[str] = FLAGS) -> bytes:
     """Compile a program by NVRTC, which needs no device.
 
     Raises:
@@ -186,8 +187,8 @@ def compiled(text: str, architecture: str) -> bytes:
     from cuda.bindings import nvrtc
 
     program = _checked(nvrtc.nvrtcCreateProgram(text.encode(), b"flights.cu", 0, [], []))
-    flags = [flag.encode() for flag in (*FLAGS, f"--gpu-architecture={architecture}")]
-    (status,) = nvrtc.nvrtcCompileProgram(program, len(flags), flags)
+    options = [flag.encode() for flag in (*flags, f"--gpu-architecture={architecture}")]
+    (status,) = nvrtc.nvrtcCompileProgram(program, len(options), options)
     if status.value:
         log = bytes(_checked(nvrtc.nvrtcGetProgramLogSize(program)))
         _checked(nvrtc.nvrtcGetProgramLog(program, log))

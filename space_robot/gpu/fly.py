@@ -7,12 +7,9 @@ from collections.abc import Callable, Sequence
 import click
 
 from space_robot_msgs_py.config.validation import one_of
-from space_robot_msgs_py.errors import InputError
 
-from ..flight.batch import FlownInBatch, plain_law_obstacle
+from ..flight.batch import FlownInBatch
 from ..flight.plan import Flight
-from .batch import LOG_BYTES, DeviceBatch
-from .cuda import find_device
 from .device import Device
 
 DEVICES = ("cpu", "gpu")
@@ -28,16 +25,11 @@ def device_named(name: str) -> Device | None:
     Raises:
         InputError: no such device, or it cannot be used.
     """
-    return None if one_of(name, DEVICES, "device") == "cpu" else find_device()
+    if one_of(name, DEVICES, "device") == "cpu":
+        return None
+    from .cuda import find_device
 
-
-def check_on_device(flight: Flight) -> None:
-    """Check that a flight can be flown on a device."""
-    if flight.plant_settings.has_message_faults or flight.flies_by_messages:
-        raise InputError("device gpu: messages that fail, and flight code in C, fly on the CPU")
-    for law in (flight.law, *(law for _, law in flight.swaps)):
-        if why := plain_law_obstacle(type(law)):
-            raise InputError(f"device gpu: {why}")
+    return find_device()
 
 
 def fly_on_device(
@@ -59,8 +51,8 @@ def fly_on_device(
     Raises:
         InputError: a kernel has no translation, or the memory is too small for one flight.
     """
-    for flight in flights:
-        check_on_device(flight)
+    from .batch import LOG_BYTES, DeviceBatch  # the translator is for those who use it
+
     flown: list[FlownInBatch] = []
     size = min(len(flights), MOST_FLIGHTS)
     while len(flown) < len(flights):

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 import pytest
 import yaml
+from cpu_device import CpuDevice
 from exported_kernels import needs_compiler
 from flights import space_robot_here
 
@@ -37,6 +38,7 @@ from space_robot import FlownFlight
 from space_robot.analysis.words import with_statistic
 from space_robot.flight.batch import FlightBatch, batches
 from space_robot.flight.plan import Flight
+from space_robot.gpu.fly import fly_on_device
 from space_robot_msgs_py.bag.reader import read_flight
 from space_robot_msgs_py.compiled.lanes import WIDTH
 
@@ -199,6 +201,21 @@ def test_it_flies_among_seven_others(plan: Planned, flown: Get) -> None:
     assert blocks[0].ending.reason == expected.reason
     for left, wanted in zip(memory(flights[own]), memory(expected.flight), strict=True):
         assert left == wanted
+
+
+@cells("lanes")
+def test_it_flies_on_a_device(plan: Planned, flown: Get) -> None:
+    """Beside another flight, by the program for a GPU, compiled for this processor."""
+    expected, device = flown(plan), CpuDevice()
+    law = expected.flight.law
+    gains = {} if "gains" in plan.options else {law.name: law.gain_values}
+    flights = [plan.scenario.replace(**plan.neighbour(1, gains)).check(), plan.scenario.check()]
+    _, block = fly_on_device(flights, device)
+    assert difference(block.log, expected.log) == ""
+    assert block.log.laws == expected.log.laws
+    assert block.ending.reason == expected.reason
+    assert flights[1].plant.truth.block.tobytes() == expected.flight.plant.truth.block.tobytes()
+    assert len(device.texts) == 1
 
 
 @cells("messages")

@@ -94,6 +94,7 @@ class Campaign:
         workers: int | None = None,
         scheduler: str | None = None,
         timeout_s: float | None = None,
+        device: str = "cpu",
         progress: Callable[[Progress], object] | bool | None = None,
         warn: Callable[[str], object] = warnings.warn,
     ) -> FlownCampaign:
@@ -111,6 +112,7 @@ class Campaign:
             scheduler: address of a Dask scheduler whose workers fly instead.
             timeout_s: longest wall-clock time of a flight; its outcome is then ``out_of_time``.
                 With such a limit flights are flown one by one, not eight at a time.
+            device: ``gpu``: flights that share a batch fly on an NVIDIA device, with the same rows.
             progress: called at the beginning and after each group of up to eight flights; True: a
                 progress line, in a terminal or a notebook.
             warn: called with a line if the folder's copy of the study was changed, and for each
@@ -130,11 +132,13 @@ class Campaign:
             _check_local(local, out, workers, scheduler)
             workers = 0
             warn(f"metrics {', '.join(local)}: {SESSION_ONLY}: this process flies alone")
-        prepared = Preparation.of(self.study, seed, runs)
+        prepared = Preparation.of(self.study, seed, runs, device)
         usual = 0 if is_daemonic() else cores()
         processes = usual if workers is None else as_whole_number(workers, "workers", 0)
         if timeout_s is not None:
             as_positive(timeout_s, "timeout_s")
+            if device == "gpu":
+                raise InputError("a time limit is of single flights, which fly on the cpu")
             if not processes and scheduler is None:
                 raise InputError(
                     "a time limit needs a worker process, which can be ended: 1 or more"

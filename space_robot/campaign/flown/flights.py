@@ -21,6 +21,7 @@ from space_robot_msgs_py.errors import FlightError, InputError
 from ...console.files import make_folder
 from ...flight.ending import DIVERGED, FAILED, UNANSWERED
 from ...flight.simulate import simulate
+from ...gpu.fly import MOST_FLIGHTS
 from ...processes.executor import OutOfTimeError, WorkerDiedError, run_many
 from ..row.fly import BatchFlyer, RowFlyer
 from ..row.row import KILLED, OUT_OF_TIME, Row, Task
@@ -115,7 +116,8 @@ class Flights:
         ``on_progress`` is called at the beginning and after every batch of flights; flights with a
         time limit are flown one by one.
         """
-        batches = TaskBatches(self.missing(), WIDTH if timeout_s is None else 1)
+        together = MOST_FLIGHTS if self._flyer.device == "gpu" else WIDTH
+        batches = TaskBatches(self.missing(), together if timeout_s is None else 1)
         died: set[Task] = set()
         running = run_many(
             BatchFlyer(self._flyer),

@@ -15,6 +15,7 @@ from ...flight.batch import batch_obstacle
 from ...flight.compilation import compile_kernels, compile_lanes
 from ...flight.plan import Flight
 from ...flight.simulate import simulate
+from ...gpu.fly import device_named
 from ...processes.executor import run_many
 from ...processes.software import commit
 from ..row.fly import RowFlyer
@@ -34,20 +35,25 @@ class Preparation:
     study: Study
     seed: int
     runs: int
+    device: str = "cpu"
 
     @classmethod
-    def of(cls, study: Study, seed: int, runs: int | None) -> Preparation:
+    def of(
+        cls, study: Study, seed: int, runs: int | None, device: str = "cpu"
+    ) -> Preparation:
         """Check seed and number of runs; ``runs`` None: from the file."""
         as_whole_number(seed, "seed", 0)
         if runs is not None:
             as_whole_number(runs, "runs", 1)
         asked = study.runs_asked(runs)
-        return cls(study, seed, min(asked, study.until.runs) if study.until else asked)
+        device_named(device)
+        runs = min(asked, study.until.runs) if study.until else asked
+        return cls(study, seed, runs, device)
 
     @cached_property
     def flyer(self) -> RowFlyer:
         """Flies each task of the campaign."""
-        return RowFlyer.of(self.study, self.seed, self.runs)
+        return RowFlyer.of(self.study, self.seed, self.runs, self.device)
 
     @cached_property
     def flights(self) -> dict[str, Flight]:

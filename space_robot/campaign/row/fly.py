@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import lru_cache, partial
 
 from space_robot_msgs_py.bag.flight_log import FlightLog
+from space_robot_msgs_py.compiled.lanes import WIDTH
 from space_robot_msgs_py.config.text import one_line_of
 from space_robot_msgs_py.errors import InputError, SpaceRobotError
 
@@ -15,6 +16,7 @@ from ...analysis.own_metric import MetricError, listed_metrics
 from ...flight.batch import batches, fly_group
 from ...flight.ending import FAILED, Ending
 from ...flight.plan import Flight
+from ...gpu.fly import MOST_FLIGHTS, device_named, fly_on_device
 from ..draws import Draws
 from ..study import Study
 from .measure import measure_row, needs_truth_only
@@ -32,11 +34,13 @@ class RowFlyer:
     seed: int
     runs: int
     """Number of runs of the design."""
+    device: str = "cpu"
+    """Where batches fly: ``cpu`` or ``gpu``."""
 
     @classmethod
-    def of(cls, study: Study, seed: int, runs: int) -> RowFlyer:
+    def of(cls, study: Study, seed: int, runs: int, device: str = "cpu") -> RowFlyer:
         """Return the flyer of a campaign."""
-        return cls(study.model_dump_json(by_alias=True), study.where, seed, runs)
+        return cls(study.model_dump_json(by_alias=True), study.where, seed, runs, device)
 
     @property
     def study(self) -> Study:
@@ -62,7 +66,8 @@ class RowFlyer:
     def fly_batch(self, tasks: Sequence[Task]) -> list[Row]:
         """Fly tasks and return their rows, in any order.
 
-        Those that can share a batch fly in lanes; each row is the one of the task alone.
+        Those that can share a batch fly in lanes, or on the device; each row is the one of the
+        task alone.
         """
         rows: list[Row] = []
         flights: list[Flight] = []
@@ -75,14 +80,16 @@ class RowFlyer:
                 rows.append(_unflown(task, self.draws.values(task.run), error))
         study = self.study
         is_brief = not study.metrics and needs_truth_only(flights, study.require.values())
-        for group in batches(enumerate(flights)):
+        device = device_named(self.device)
+        fly = fly_group if device is None else partial(fly_on_device, device=device)
+        for group in batches(enumerate(flights), MOST_FLIGHTS if device else WIDTH):
             numbers = [number for number, _ in group]
             if len(group) > 1:
                 with suppress(Exception):  # of one of them, whose own row says it
                     sharing = [flight for _, flight in group]
                     rows += [
                         self.measured_row(flown[numbers[k]], sharing[k], ending, log)
-                        for k, log, ending in fly_group(sharing, is_brief)
+                        for k, log, ending in fly(sharing, is_brief=is_brief)
                     ]
                     continue
             rows += [self(flown[k]) for k in numbers]
