@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from space_robot.gpu.device import Device, Memory, Program
+from space_robot.gpu.dlpack import CPU
 
 FLAGS = ("-std=c++17", "-O0", "-ffp-contract=off", "-shared", "-fPIC", "-Werror")
 
@@ -19,9 +20,12 @@ FLAGS = ("-std=c++17", "-O0", "-ffp-contract=off", "-shared", "-fPIC", "-Werror"
 class CpuMemory(Memory):
     """An array of this process."""
 
+    kind = CPU
+
     def __init__(self, array: NDArray[Any]) -> None:
         self.array = np.ascontiguousarray(array).copy()
         self.pointer = self.array.ctypes.data
+        self.shape, self.dtype = self.array.shape, self.array.dtype
 
     def read(self) -> NDArray[Any]:
         return self.array.copy()

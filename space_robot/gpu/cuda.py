@@ -20,6 +20,7 @@ from space_robot_msgs_py.errors import InputError, SpaceRobotError
 
 from ..console.files import atomic_file
 from .device import Device, Memory, Program
+from .dlpack import CUDA
 
 THREADS = 64
 """Of a block: the flights of a small batch are spread over the device."""
@@ -123,9 +124,11 @@ class CudaDevice(Device):
 class CudaMemory(Memory):
     """An array on an NVIDIA device."""
 
+    kind = CUDA
+
     def __init__(self, driver: Any, array: NDArray[Any]) -> None:
         """Copy an array."""
-        self._driver, self._dtype, self._shape = driver, array.dtype, array.shape
+        self._driver, self.dtype, self.shape = driver, array.dtype, array.shape
         self._bytes = max(array.nbytes, 1)
         self._row = array.itemsize * int(np.prod(array.shape[1:], dtype=int))
         self._address = _checked(driver.cuMemAlloc(self._bytes))
@@ -135,7 +138,7 @@ class CudaMemory(Memory):
 
     def read(self) -> NDArray[Any]:
         """Return the numbers."""
-        array = np.empty(self._shape, self._dtype)
+        array = np.empty(self.shape, self.dtype)
         if array.nbytes:
             _checked(self._driver.cuMemcpyDtoH(array.ctypes.data, self._address, array.nbytes))
         return array

@@ -5,14 +5,32 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from typing import Any
 
+import numpy as np
 from numpy.typing import NDArray
+
+from .dlpack import capsule
 
 
 class Memory(ABC):
-    """An array on a device; it is freed with this object."""
+    """An array on a device; it is freed with this object.
+
+    Other libraries have it without a copy: ``torch.from_dlpack(memory)``.
+    """
 
     pointer: int
     """Its address for programs."""
+    shape: tuple[int, ...]
+    dtype: np.dtype[Any]
+    kind: int
+    """Of the device, see `dlpack`."""
+
+    def __dlpack_device__(self) -> tuple[int, int]:
+        """Return kind and number of the device."""
+        return self.kind, 0
+
+    def __dlpack__(self, **options: Any) -> Any:
+        """Return the array for another library, which has the same memory."""
+        return capsule(self, self.pointer, self.shape, self.dtype, self.kind)
 
     @abstractmethod
     def read(self) -> NDArray[Any]:

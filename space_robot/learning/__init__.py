@@ -10,7 +10,10 @@ from typing import TYPE_CHECKING, Any
 
 from space_robot_msgs_py.config.validation import one_of
 
+from ..gpu.fly import device_named
+
 if TYPE_CHECKING:
+    from ..gpu.reach_env import ReachDeviceEnv
     from .reach_env import ReachEnv, ReachVectorEnv
 
 TASKS = ("reach",)
@@ -34,16 +37,23 @@ def make(task: str, **settings: Any) -> ReachEnv:
     return ReachEnv(**settings)
 
 
-def make_vec(task: str, num_envs: int = 8, threads: int = 1, **settings: Any) -> ReachVectorEnv:
+def make_vec(
+    task: str, num_envs: int = 8, threads: int = 1, device: str = "cpu", **settings: Any
+) -> ReachVectorEnv | ReachDeviceEnv:
     """Return a vector environment of Gymnasium: many at once, each with the bits of `make`'s.
 
     Args:
         task: see `make`.
         num_envs: number of environments; a multiple of 8 fills all lanes.
         threads: among which they are divided.
+        device: ``gpu``: on an NVIDIA device, where all arrays stay, see `ReachDeviceEnv`.
         settings: see `make`.
     """
     one_of(task, TASKS, "task")
+    if place := device_named(device):
+        from ..gpu.reach_env import ReachDeviceEnv
+
+        return ReachDeviceEnv(num_envs, place, **settings)
     from .reach_env import ReachVectorEnv  # Gymnasium is an extra
 
     return ReachVectorEnv(num_envs, threads, **settings)

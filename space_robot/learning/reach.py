@@ -9,12 +9,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from space_robot_model.dynamics.attitude import attitude_error_into
+from space_robot_model.elementary.normal import State as RandomState
+from space_robot_model.elementary.normal import following, unit_of
 from space_robot_msgs_py.compiled.kernels import kernel
-from space_robot_msgs_py.compiled.lanes import WIDTH, as_lanes, where, with_lane
+from space_robot_msgs_py.compiled.lanes import WIDTH, as_lanes, where, whole, with_lane
 from space_robot_msgs_py.compiled.records import Block, Record, shaped
 from space_robot_msgs_py.samples import State
 from space_robot_sim.plant.lanes import move_lanes, spread
-from space_robot_sim.plant.tick import RATE_LIMIT, advance, begin_interval, end_interval
+from space_robot_sim.plant.tick import (
+    RATE_LIMIT,
+    advance,
+    begin_interval,
+    end_interval,
+    write_true_state,
+)
 
 Array = NDArray[np.float64]
 
@@ -30,6 +38,8 @@ LARGEST = 1e4
 class Reach(Record):
     """An episode of the task."""
 
+    start: Array = shaped(lambda n: (n,))
+    """Joint positions at the beginning, rad or m."""
     target: Array = shaped(lambda n: (n,))
     """Joint positions to be reached, rad or m."""
     attitude: Array = shaped(lambda n: (4,))
@@ -110,9 +120,33 @@ def step_alone(
 
 
 @kernel
-def observe_start(plant: Block, reach: Block) -> None:
-    """Write the first observation of an episode."""
-    observe(reach[0], plant[0].truth)
+def begin_episode(plant: Block, reach: Block, period: float) -> None:
+    """Put a plant that stands at tick 0 at the start of an episode, and write what is observed."""
+    memory, task = plant[0], reach[0]
+    for i in range(task.start.size):
+        memory.x[7 + whole(memory.model.row[i])] = task.start[i]
+    write_true_state(memory, 0, period)
+    task.attitude[:] = memory.truth.quaternion
+    task.tick, task.has_failed = 0.0, 0.0
+    observe(task, memory.truth)
+
+
+@kernel
+def draw_episode(
+    random: RandomState, plant: Block, reach: Block, spread: float, distance: float
+) -> RandomState:
+    """Draw an episode as `reach_env.ReachTask.episode` does, about the plant's joint positions.
+
+    ``random`` is the state of a generator; that after the draws is returned.
+    """
+    about, task = plant[0].truth.joint_positions, reach[0]
+    for i in range(task.start.size):
+        random = following(random)
+        task.start[i] = about[i] + spread * (2.0 * unit_of(random) - 1.0)
+    for i in range(task.start.size):
+        random = following(random)
+        task.target[i] = task.start[i] + distance * (2.0 * unit_of(random) - 1.0)
+    return random
 
 
 @kernel

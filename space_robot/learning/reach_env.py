@@ -22,7 +22,7 @@ from space_robot_msgs_py.config.installation import install_command
 from space_robot_msgs_py.config.validation import one_of, short
 from space_robot_msgs_py.errors import InputError
 from space_robot_sim.plant.plant import Plant
-from space_robot_sim.plant.tick import PlantMemory, update_true_state
+from space_robot_sim.plant.tick import PlantMemory
 
 try:
     import gymnasium
@@ -37,7 +37,7 @@ from ..flight.compilation import compile_kernels
 from ..flight.lane_loop import InLanes
 from ..flight.lane_memory import in_lanes, record_numbers
 from ..flight.plan import Flight
-from .reach import LARGEST, Reach, observe_start, step_alone, step_in_lanes
+from .reach import LARGEST, Reach, begin_episode, step_alone, step_in_lanes
 
 Array = NDArray[np.float64]
 Info = dict[str, Any]
@@ -115,17 +115,15 @@ class ReachTask:
         return Episode(start, start + self.reach * generator.uniform(-1.0, 1.0, self.n))
 
     def put(self, episode: Episode, plant: Block, reach: Block) -> None:
-        """Write the begin of an episode into blocks (1,) of `PlantMemory` and `Reach`."""
+        """Begin an episode in blocks (1,) of `PlantMemory` and `Reach`."""
         plant[:] = self.begin.block
-        rows = 7 + self.begin.memory.model.row[: self.n].astype(int)
-        plant["x"][0, rows] = episode.start
-        update_true_state(plant, 0, self.period)
-        reach["target"], reach["scale"] = episode.target, self.scale
-        reach["attitude"] = self.begin.truth.quaternion
-        reach["tick"], reach["ticks"], reach["has_failed"] = 0.0, self.ticks, 0.0
+        reach["start"], reach["target"] = episode
+        reach["scale"], reach["ticks"] = self.scale, self.ticks
+        begin_episode(plant, reach, self.period)
 
 
-def _task(settings: Mapping[str, Any]) -> ReachTask:
+def task_with(settings: Mapping[str, Any]) -> ReachTask:
+    """Return the task with settings by name."""
     for name in settings:
         one_of(name, signature(ReachTask).parameters, "setting", " of the task reach")
     return ReachTask(**settings)
@@ -173,8 +171,8 @@ class ReachEnv(gymnasium.Env[Array, Array]):
 
     def __init__(self, **settings: Any) -> None:
         """Create an environment; ``settings`` are those of `ReachTask`."""
-        self.task = _task(settings)
-        self.observation_space, self.action_space = _spaces(self.task)
+        self.task = task_with(settings)
+        self.observation_space, self.action_space = spaces(self.task)
         self._plant, self._reach = self.task.begin.block.copy(), Reach.block(self.task.n)
 
     def reset(
@@ -183,7 +181,6 @@ class ReachEnv(gymnasium.Env[Array, Array]):
         """Start an episode; ``options`` is not used."""
         super().reset(seed=seed)
         self.task.put(self.task.episode(self.np_random), self._plant, self._reach)
-        observe_start(self._plant, self._reach)
         return self._reach["observation"][0].copy(), {}
 
     def step(self, action: Array) -> tuple[Array, float, bool, bool, Info]:
@@ -215,8 +212,8 @@ class ReachVectorEnv(VectorEnv[Array, Array, Array]):
             settings: of `ReachTask`.
         """
         self.num_envs = as_whole_number(num_envs, "num_envs", 1, MOST_ENVS)
-        self.task = task = _task(settings)
-        self.single_observation_space, self.single_action_space = _spaces(task)
+        self.task = task = task_with(settings)
+        self.single_observation_space, self.single_action_space = spaces(task)
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
         self.action_space = batch_space(self.single_action_space, self.num_envs)
         self.metadata = {"autoreset_mode": AutoresetMode.NEXT_STEP}
@@ -321,14 +318,14 @@ class ReachVectorEnv(VectorEnv[Array, Array, Array]):
         plant, reach = self._begin
         for k in numbers:
             self.task.put(self.task.episode(self._generators[k]), plant, reach)
-            observe_start(plant, reach)
             group, lane = divmod(int(k), WIDTH)
             self._states[group, :, lane] = plant["x"][0, : self._states.shape[1]]
             record_numbers(self._reaches[group : group + 1])[:, lane] = reach.view(np.float64)
             self._observations[k] = reach["observation"][0]
 
 
-def _spaces(task: ReachTask) -> tuple[Any, Any]:
+def spaces(task: ReachTask) -> tuple[Any, Any]:
+    """Return the spaces of an observation and of an action."""
     m = task.n + 3
     high = np.full(2 * m, LARGEST)
     high[:3] = 2.0

@@ -41,7 +41,7 @@ HASH, HASH_FACTOR = np.uint64(0x43B0D7E5), np.uint64(0x931E8875)
 OUT_HASH, OUT_FACTOR = np.uint64(0x8B51F9DD), np.uint64(0x58F38DED)
 MIX_LEFT, MIX_RIGHT = np.uint64(0xCA01F9DD), np.uint64(0x4973F715)
 FACTOR_HIGH, FACTOR_LOW = np.uint64(0x2360ED051FC65DA4), np.uint64(0x4385DF649FCCF645)
-UNUSED_BITS, SPACING = np.uint64(12), 2.0**-52
+UNUSED_BITS, SPACING, UNIT = np.uint64(12), 2.0**-52, 2.0**-53
 CENTRE = 0.425
 """Distance from 1/2 up to which Wichura's first pair of polynomials is used."""
 TAIL = 5.0
@@ -206,6 +206,12 @@ def following(state: State) -> State:
     high = high * FACTOR_LOW + low * FACTOR_HIGH + upper
     high, low = _add_128(high, low * FACTOR_LOW, step_high, step_low)
     return high, low, step_high, step_low
+
+
+@subroutine
+def unit_of(state: State) -> float:
+    """Return the number in [0, 1) that `numpy.random.Generator` makes of the generator's bits."""
+    return np.int64(bits_of(state) >> np.uint64(11)) * UNIT
 
 
 @subroutine
