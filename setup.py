@@ -57,6 +57,7 @@ setup(
         "space_robot.campaign.report": ["templates/*.j2"],
         "space_robot.choice": ["templates/*.j2"],
         "space_robot.cli": ["templates/*.txt"],
+        "space_robot.gpu": ["templates/*.j2"],
         "space_robot.help": ["*.md"],
         "space_robot.paper": ["templates/*.j2"],
         "space_robot.view": ["templates/*"],
@@ -101,6 +102,7 @@ setup(
             "ruff",  # wraps the signatures
             "ziamath",
         ],
+        "gpu": ["cuda-bindings>=12.9", "nvidia-cuda-nvrtc>=13"],  # flights on NVIDIA devices
         "gym": ["gymnasium>=1.0"],  # space_robot.api.gymnasium_env
         "mpc": ["daqp>=0.8"],  # examples/mpc_law.py
         "mutation": ["cosmic-ray"],  # tools/mutation
@@ -116,6 +118,7 @@ setup(
             "build>=1.2",
             "cvxpy",
             "catkin_pkg",  # ROS's generators of interfaces
+            "cuda-bindings>=12.9",
             "daqp>=0.8",
             "distributed>=2024.1",
             "gymnasium>=1.0",
@@ -129,6 +132,7 @@ setup(
             "mypy",
             "nbclient",
             "nbconvert",
+            "nvidia-cuda-nvrtc>=13",
             "pandas>=2.1",
             "pin",
             "pre-commit",

@@ -39,6 +39,7 @@ USES = {
     "parquet": "analyze --parquet",
     "xacro": "robots in xacro files",
     "gym": "Gymnasium environments",
+    "gpu": "flights on an NVIDIA device",
     "dask": "campaign run --scheduler",
     "mpc": "the example of model predictive control",
     "notebooks": "the notebooks of the documentation",
@@ -90,6 +91,7 @@ def examine() -> Iterator[CheckedItem]:
     yield check_processor()
     yield check_memory()
     yield check_deadlines(measure_lateness())
+    yield check_gpu()
     yield from check_ros()
     yield check_compilers()
 
@@ -207,6 +209,18 @@ def check_memory(table: Path = Path("/proc/meminfo")) -> CheckedItem:
     advice = "close other programs: the first flight compiles kernels, which takes about 1 GB"
     values = {"total_bytes": total, "available_bytes": available}
     return judged("memory", text, advice if available < GIGABYTE else "", values)
+
+
+def check_gpu() -> CheckedItem:
+    """Check for a device that flights could fly on; none is needed."""
+    from .gpu.cuda import find_device
+
+    try:
+        device = find_device()
+    except SpaceRobotError as error:
+        return CheckedItem("GPU", "ok", f"none: {str(error).rpartition('used: ')[2]}")
+    text = f"{device.name}, {device.free_bytes / 1e9:.1f} GB free"
+    return CheckedItem("GPU", "ok", text, values={"free_bytes": device.free_bytes})
 
 
 def measure_lateness() -> dict[str, Any]:

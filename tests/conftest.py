@@ -42,6 +42,7 @@ if TYPE_CHECKING:
 ROBOTS = CONFIG / "robots"
 
 TOOLS = (
+    "cuda",
     "cvxpy",
     "gymnasium",
     "hypothesis",

@@ -15,7 +15,8 @@ from ..flight.batch import FlightBatch, batch_obstacle, batches
 from ..flight.benches import Benches
 from ..flight.compilation import compile_kernels, compile_lanes
 from ..flight.plan import Flight
-from ..gpu.fly import MOST_FLIGHTS, Device, device_named, fly_on_device
+from ..gpu.device import Device
+from ..gpu.fly import MOST_FLIGHTS, device_named, fly_on_device
 from .flown_flight import FlownFlight, fly_in_process
 from .scenario import FlyableScenario as Scenario
 

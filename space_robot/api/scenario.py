@@ -57,8 +57,8 @@ class FlyableScenario(Scenario):
     - ``gains``: values by gain, in place of the default set's: ``{"k_1": 3.0, "h_bar": [...]}``,
       one for all axes or n+3 (base x, y, z, joints); or such a mapping for each of several laws
     - ``mission``: a mission's document, ``{"start": ..., "segments": [...]}``, or
-      `MissionSettings`; also ``initial_joints_deg``, ``initial_quaternion`` and
-      ``initial_rate_deg_s`` (default: the mission's start)
+      `MissionSettings`. The flight begins at its start, or where the plant's parameters
+      ``initial_joints_deg``, ``initial_quaternion`` and ``initial_rate_deg_s`` say
     - ``disturbance``: columns, numbers by name; or a function of time, sampled at 100 Hz
     - ``case``, ``sensors``, ``actuators``, ``orbit``: their settings, objects or mappings
     - ``assumed_actuators``: the base's actuators as assumed by the flight software

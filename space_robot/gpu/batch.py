@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
@@ -77,13 +78,20 @@ def columns_of(log: FlightLog) -> list[Column]:
 class DeviceBatch:
     """Flights of one `batch_key` that fly together on a device."""
 
-    def __init__(self, flights: Sequence[Flight], device: Device, is_brief: bool = False) -> None:
-        """Copy the memory of checked flights to a device.
+    def __init__(
+        self,
+        flights: Sequence[Flight],
+        device: Device,
+        is_brief: bool = False,
+        is_logged: bool = True,
+    ) -> None:
+        """Translate the closed loop of checked flights.
 
         Args:
             flights: that share a batch.
             device: where they fly.
             is_brief: see `empty_log`.
+            is_logged: False: nothing is kept but the state at the end.
         """
         self.flights, self._device = list(flights), device
         first = self.flights[0]
@@ -92,12 +100,17 @@ class DeviceBatch:
             assert isinstance(law, CompiledLaw)
             self._laws[law.name] = law
         self._choices = [LawChoice(flight.law, flight.swaps) for flight in self.flights]
-        self.logs = [empty_log(flight, is_brief=is_brief) for flight in self.flights]
-        self._columns = columns_of(self.logs[0])
+        ticks = first.ticks if is_logged else 0
+        self.logs = [empty_log(flight, 0, ticks, is_brief=is_brief) for flight in self.flights]
+        self._axes = len(first.plant.names.axes)
+        self._columns = columns_of(self.logs[0]) if is_logged else []
         self._row = sum(column.width for column in self._columns)
-        self._telemetry = self._row if self.logs[0].telemetry is not None else 0
+        self._telemetry = self._row if is_logged and self.logs[0].telemetry is not None else 0
         if self._telemetry:
-            self._row += 2 * self.logs[0].axes
+            self._row += 2 * self._axes
+        self._engages = False
+        self.seconds = 0.0
+        """Time of the program so far."""
         self._varying: set[FieldName] = set()
         self._plants = np.concatenate([flight.plant.block for flight in self.flights])
         self._controllers = np.concatenate([flight.controller.block for flight in self.flights])
@@ -116,7 +129,7 @@ class DeviceBatch:
     def fly(self, progress: Callable[[int], object] = lambda tick: None) -> list[FlownInBatch]:
         """Fly every tick; return the flights as they ended."""
         self._store()
-        rows = max(1, LOG_BYTES // (8 * self._row * len(self.flights)))
+        rows = max(1, LOG_BYTES // (8 * max(1, self._row) * len(self.flights)))
         for start, stop in self.flights[0].stretches(min(rows, MOST_STRETCH)):
             progress(start)
             self._choose_laws(start)
@@ -181,11 +194,7 @@ class DeviceBatch:
                 "memory": type(law).memory_type,
                 "tick": translation.call(
                     f"tick_{law.name}",
-                    {
-                        **loop,
-                        "law_gains": f"{law.name}_gains",
-                        "law_memory": f"&{law.name}_memory",
-                    },
+                    {**loop, "law_gains": f"{law.name}_gains", "law_memory": f"&{law.name}_memory"},
                 ),
             }
             for law in self._laws.values()
@@ -197,7 +206,7 @@ class DeviceBatch:
             "reference": Reference,
             "rows": len(first.plant.command_delay_buffer),
             "commanded": len(first.plant.names.commanded),
-            "axes": self.logs[0].axes,
+            "axes": self._axes,
             "columns": self._columns,
             "telemetry": self._telemetry,
             "rate_limit": repr(RATE_LIMIT),
@@ -269,7 +278,9 @@ class DeviceBatch:
                 "row_stride": self._row * count,
             }
             self._engages = False
+            begun = time.monotonic()
             self._program.run("fly", count, self._device.store(self._common(numbers, log)))
+            self.seconds += time.monotonic() - begun
             if not self._change(stop):
                 break
         self._log = log
@@ -284,7 +295,7 @@ class DeviceBatch:
         for name in (*order, "statuses", "fastest"):
             pointers[name] = self._whole[name].pointer
         pointers["log"] = log.pointer
-        fields = [(name, np.int64) for name in numbers]
+        fields: list[tuple[str, Any]] = [(name, np.int64) for name in numbers]
         fields += [("period", np.float64), *((name, np.uint64) for name in pointers)]
         values = (*numbers.values(), self.flights[0].period, *pointers.values())
         return np.array([values], fields)
@@ -345,6 +356,8 @@ class DeviceBatch:
     # logs
 
     def _keep_rows(self, start: int, stop: int) -> None:
+        if not self._columns:
+            return
         numbers = np.ascontiguousarray(self._log.read().transpose(2, 0, 1))
         for log, rows in zip(self.logs, numbers, strict=True):
             for column, place in self._targets(log):

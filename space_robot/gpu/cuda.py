@@ -40,8 +40,7 @@ def find_device() -> Device:
         InputError: there is none that can be used; says why.
     """
     try:
-        from cuda.bindings import driver  # type: ignore[import-not-found,unused-ignore]
-        from cuda.bindings import nvrtc  # noqa: F401
+        from cuda.bindings import driver, nvrtc  # noqa: F401
     except ImportError:
         how = install_command("gpu")
         raise InputError(f"device gpu: cuda-bindings is not installed: {how}") from None

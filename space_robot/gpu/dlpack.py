@@ -30,11 +30,7 @@ class _Tensor(ctypes.Structure):
 
 
 class _Managed(ctypes.Structure):
-    _fields_ = (
-        ("tensor", _Tensor),
-        ("context", ctypes.c_void_p),
-        ("delete", ctypes.c_void_p),
-    )
+    _fields_ = (("tensor", _Tensor), ("context", ctypes.c_void_p), ("delete", ctypes.c_void_p))
 
 
 _DELETER = ctypes.CFUNCTYPE(None, ctypes.c_void_p)
@@ -42,12 +38,14 @@ _in_use: dict[int, tuple[Any, ...]] = {}
 """What the consumers of capsules need, by the capsules' addresses."""
 
 
-@_DELETER
+@_DELETER  # type: ignore[untyped-decorator,unused-ignore]
 def _delete(address: int) -> None:
     _in_use.pop(address, None)
 
 
-def capsule(owner: Any, pointer: int, shape: tuple[int, ...], dtype: np.dtype[Any], kind: int) -> Any:
+def capsule(
+    owner: Any, pointer: int, shape: tuple[int, ...], dtype: np.dtype[Any], kind: int
+) -> Any:
     """Return a DLPack capsule of an array in C order, whose ``owner`` lives as long as it is used.
 
     Args:
@@ -66,5 +64,8 @@ def capsule(owner: Any, pointer: int, shape: tuple[int, ...], dtype: np.dtype[An
     address = ctypes.addressof(managed)
     _in_use[address] = owner, managed, sizes
     make = ctypes.pythonapi.PyCapsule_New
-    make.restype, make.argtypes = ctypes.py_object, (ctypes.c_void_p, ctypes.c_char_p, ctypes.c_void_p)
+    make.restype, make.argtypes = (
+        ctypes.py_object,
+        (ctypes.c_void_p, ctypes.c_char_p, ctypes.c_void_p),
+    )
     return make(address, NAME, None)

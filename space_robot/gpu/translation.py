@@ -27,7 +27,7 @@ from space_robot_control.flight_code.software import (
 )
 from space_robot_control.laws.base import CompiledLaw
 from space_robot_model.elementary.normal import normal_numbers, normal_numbers_of_one
-from space_robot_msgs_py.compiled.records import Record
+from space_robot_msgs_py.compiled.records import Field, Record
 from space_robot_msgs_py.samples import Reference, State
 from space_robot_sim.plant.tick import PlantMemory, advance, measure
 
@@ -104,11 +104,13 @@ class Translation:
         blocks = [(record, block) for record, block in parts.items() if record in LARGE]
         found = constant_fields(self.program, blocks, self._written)
         zero = np.float64(0.0).tobytes()
-        return {
-            field: number
-            for field, number in found.items()
-            if field.record.fields()[field.name].uniform or np.float64(number).tobytes() == zero
-        }
+
+        def is_known(record: type[Record], name: str, number: float) -> bool:
+            declared = record.fields()[name]
+            is_uniform = isinstance(declared, Field) and declared.uniform
+            return is_uniform or np.float64(number).tobytes() == zero
+
+        return {field: number for field, number in found.items() if is_known(*field, number)}
 
     def call(self, root: str, given: Mapping[str, str]) -> str:
         """Return the text that calls a kernel with texts by the names of its parameters."""
@@ -165,10 +167,7 @@ def loop_calls(flight: Flight, laws: Sequence[CompiledLaw]) -> dict[str, Call]:
     inputs = tick, states, references, torque, period
     return {
         "measure": (measure, (argument(lang.BlockOf(PlantMemory)), tick, period)),
-        "advance": (
-            advance,
-            (argument(lang.Pointer(PlantMemory)), buffer, torque, tick, period),
-        ),
+        "advance": (advance, (argument(lang.Pointer(PlantMemory)), buffer, torque, tick, period)),
         "engage": (engage, (controller,)),
         **{
             f"tick_{law.name}": (controller_tick, (controller, law_argument(law), how, *inputs))

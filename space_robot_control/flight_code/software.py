@@ -164,7 +164,8 @@ def _program(
     program = KernelProgram(software.sizes, software.joints)
     program.constants = constants
     supervision, controller, state, reference = (
-        argument(lang.BlockOf(record)) for record in (Supervision, ControllerMemory, State, Reference)
+        argument(lang.BlockOf(record))
+        for record in (Supervision, ControllerMemory, State, Reference)
     )
     tick, period = argument(lang.INT), argument(lang.FLOAT)
     has_actuators = bool(software.controller.names.actuators)

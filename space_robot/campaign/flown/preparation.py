@@ -38,9 +38,7 @@ class Preparation:
     device: str = "cpu"
 
     @classmethod
-    def of(
-        cls, study: Study, seed: int, runs: int | None, device: str = "cpu"
-    ) -> Preparation:
+    def of(cls, study: Study, seed: int, runs: int | None, device: str = "cpu") -> Preparation:
         """Check seed and number of runs; ``runs`` None: from the file."""
         as_whole_number(seed, "seed", 0)
         if runs is not None:

@@ -364,6 +364,7 @@ class Expressions:
         array = self.translate(node.func.value)
         if ast.unparse(node.args[0]) != "-1" or not isinstance(array.type, ArrayOf):
             raise RefusedError("this reshape()", "only reshape(-1) of an array is allowed")
-        first = "[0]" * (len(array.type.shape) - 1)
+        shape = [size or 0 for size in array.type.shape]
+        first = "[0]" * (len(shape) - 1)
         text = f"(&{array.at(lang.POSTFIX)}{first}[0])" if first else array.text
-        return replace(array, type=ArrayOf((math.prod(array.type.shape),)), text=text)
+        return replace(array, type=ArrayOf((math.prod(shape),)), text=text)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-
 import sys
 from typing import Any
 
@@ -82,7 +81,7 @@ def test_nvrtc_compiles_the_program_for_devices(device: CpuDevice) -> None:
     for architecture in ("sm_80", "sm_90"):
         binary = cuda.compiled(device.texts[0], architecture, (*cuda.FLAGS, "-G"))
         assert binary.startswith(b"\x7fELF")
-    with pytest.raises(InputError, match="NVRTC cannot compile the flights: .*error"):
+    with pytest.raises(InputError, match=r"NVRTC cannot compile the flights: .*error"):
         cuda.compiled("int f( {", "sm_90")
 
 
