@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from space_robot.gpu.device import Device, Memory, Program
+from space_robot.gpu.device import Device, DeviceProgram, Memory
 from space_robot.gpu.dlpack import CPU
 
 FLAGS = ("-std=c++17", "-O0", "-ffp-contract=off", "-shared", "-fPIC", "-Werror")
@@ -34,7 +34,7 @@ class CpuMemory(Memory):
         self.array[first : first + len(array)] = array
 
 
-class CpuProgram(Program):
+class CpuProgram(DeviceProgram):
     """A library of functions."""
 
     def __init__(self, library: ctypes.CDLL) -> None:
@@ -54,7 +54,7 @@ class CpuDevice(Device):
         self.texts: list[str] = []
         """Of the programs that were compiled."""
 
-    def compile(self, text: str) -> Program:
+    def compile(self, text: str) -> DeviceProgram:
         self.texts.append(text)
         with tempfile.TemporaryDirectory() as folder:
             source, library = Path(folder) / "flights.cpp", Path(folder) / "flights.so"

@@ -20,7 +20,7 @@ ROOMS = {
     "space_robot_sim": "faults component environment actuators sensors plant plant_node",
     "space_robot_control": "laws navigation allocation controller flight_code controller_node "
     "guidance mission_node",
-    "space_robot": "console processes scenario tuning flight export analysis view api learning "
+    "space_robot": "console processes scenario tuning flight gpu export analysis view api learning "
     "campaign choice paper doctor help cli __main__",
 }
 """Of each package, from the ground up: a room imports only from rooms that stand before it."""

@@ -29,7 +29,7 @@ PYPI |= {"cuda": "cuda-bindings"}
 PYPI |= {"sklearn": "scikit-learn", "threadpoolctl": "scikit-learn"}  # which brings it
 """Names on PyPI of modules that are not called as their package."""
 OF_EXTRAS = {
-    "cuda": "gpu",
+    "cuda-bindings": "gpu",
     "distributed": "dask",
     "gymnasium": "gym",
     "pandas": "campaign",

@@ -40,7 +40,7 @@ MOST_STRETCH = 4000
 """Ticks between two reports of progress."""
 
 
-class Column(NamedTuple):
+class LogColumn(NamedTuple):
     """Numbers of a log's row."""
 
     name: str
@@ -53,14 +53,14 @@ class Column(NamedTuple):
     """Whether they are known before the law's answer."""
 
 
-def columns_of(log: FlightLog) -> list[Column]:
+def columns_of(log: FlightLog) -> list[LogColumn]:
     """Return what the program writes at each tick, of a flight's log."""
-    columns: list[Column] = []
+    columns: list[LogColumn] = []
 
     def add(name: str, text: str, width: int, before: bool = False) -> None:
         if width:
             first = sum(column.width for column in columns)
-            columns.append(Column(name, text, width, first, before))
+            columns.append(LogColumn(name, text, width, first, before))
 
     for name in ALL_FIELDS:
         add(f"truth.{name}", f"plant.truth.{name}", getattr(log, name).shape[1], True)

@@ -19,12 +19,12 @@ from space_robot_msgs_py.config.installation import install_command
 from space_robot_msgs_py.errors import InputError, SpaceRobotError
 
 from ..console.files import atomic_file
-from .device import Device, Memory, Program
+from .device import Device, DeviceProgram, Memory
 from .dlpack import CUDA
 
 THREADS = 64
 """Of a block: the flights of a small batch are spread over the device."""
-FLAGS = ("--fmad=false", "--std=c++17")
+NVRTC_FLAGS = ("--fmad=false", "--std=c++17")
 """No fused operations: the bits are those of the operations as they are written."""
 
 
@@ -88,7 +88,7 @@ class CudaDevice(Device):
         """Make it the device of this thread."""
         _checked(self._driver.cuCtxSetCurrent(self._context))
 
-    def compile(self, text: str) -> Program:
+    def compile(self, text: str) -> DeviceProgram:
         """Compile a program, or take it from the cache of compiled kernels.
 
         Raises:
@@ -150,7 +150,7 @@ class CudaMemory(Memory):
             _checked(self._driver.cuMemcpyHtoD(place, numbers.ctypes.data, numbers.nbytes))
 
 
-class CudaProgram(Program):
+class CudaProgram(DeviceProgram):
     """A program on an NVIDIA device."""
 
     def __init__(self, device: CudaDevice, module: Any) -> None:
@@ -176,11 +176,11 @@ def program_file(text: str, architecture: str) -> Path:
     from cuda.bindings import nvrtc
 
     version = _checked(nvrtc.nvrtcVersion())
-    digest = hashlib.sha256(repr((version, architecture, FLAGS)).encode() + text.encode())
+    digest = hashlib.sha256(repr((version, architecture, NVRTC_FLAGS)).encode() + text.encode())
     return cache_directory() / "gpu" / f"{digest.hexdigest()[:32]}.cubin"
 
 
-def compiled(text: str, architecture: str, flags: Sequence[str] = FLAGS) -> bytes:
+def compiled(text: str, architecture: str, flags: Sequence[str] = NVRTC_FLAGS) -> bytes:
     """Compile a program by NVRTC, which needs no device.
 
     Raises:

@@ -41,7 +41,7 @@ class Memory(ABC):
         """Overwrite rows from ``first`` on."""
 
 
-class Program(ABC):
+class DeviceProgram(ABC):
     """A compiled program."""
 
     @abstractmethod
@@ -55,7 +55,7 @@ class Device(ABC):
     name: str
 
     @abstractmethod
-    def compile(self, text: str) -> Program:
+    def compile(self, text: str) -> DeviceProgram:
         """Compile a program, or take it from the cache."""
 
     @abstractmethod

@@ -37,7 +37,7 @@ Call = tuple[Any, tuple[lang.Value, ...]]
 """A kernel and its arguments."""
 Parts = Mapping[type[Record], NDArray[Any]]
 """Blocks (F,) of the flights' records, by kind."""
-LARGE = (PlantMemory, ControllerMemory)
+OF_THE_LOOP = (PlantMemory, ControllerMemory)
 """Records whose numbers may be known; gains are not, so that other gains need no other program."""
 
 
@@ -94,15 +94,15 @@ class Translation:
             if not more:
                 break
             self._written |= more
-        whole = [State, Reference, *(record for record in parts if record not in LARGE)]
+        whole = [State, Reference, *(record for record in parts if record not in OF_THE_LOOP)]
         self.files = Files(self.program, list(self.roots.values()), whole, lambda module: "loop")
         self.files.fields |= set(kept)
         self._records = list(parts)
 
     def constants_of(self, parts: Parts) -> dict[lang.FieldName, float]:
         """Return the fields that are known, of memory between two stretches."""
-        blocks = [(record, block) for record, block in parts.items() if record in LARGE]
-        found = constant_fields(self.program, blocks, self._written)
+        blocks = [(record, block) for record, block in parts.items() if record in OF_THE_LOOP]
+        constants = constant_fields(self.program, blocks, self._written)
         zero = np.float64(0.0).tobytes()
 
         def is_known(record: type[Record], name: str, number: float) -> bool:
@@ -110,13 +110,13 @@ class Translation:
             is_uniform = isinstance(declared, Field) and declared.uniform
             return is_uniform or np.float64(number).tobytes() == zero
 
-        return {field: number for field, number in found.items() if is_known(*field, number)}
+        return {field: number for field, number in constants.items() if is_known(*field, number)}
 
-    def call(self, root: str, given: Mapping[str, str]) -> str:
+    def call(self, root: str, texts: Mapping[str, str]) -> str:
         """Return the text that calls a kernel with texts by the names of its parameters."""
         function: Function = self.roots[root]
-        texts = ", ".join(given[parameter.name] for parameter in function.parameters)
-        return f"{self.files.name_of(function)}({texts})"
+        arguments = ", ".join(texts[parameter.name] for parameter in function.parameters)
+        return f"{self.files.name_of(function)}({arguments})"
 
     def render(self, template: str, **content: Any) -> str:
         """Return the whole text: what is translated, and the loop of a template around it."""

@@ -13,7 +13,7 @@ from space_robot_msgs_py.config.validation import one_of
 from ..gpu.fly import device_named
 
 if TYPE_CHECKING:
-    from ..gpu.reach_env import ReachDeviceEnv
+    from .reach_device_env import ReachDeviceEnv
     from .reach_env import ReachEnv, ReachVectorEnv
 
 TASKS = ("reach",)
@@ -51,7 +51,7 @@ def make_vec(
     """
     one_of(task, TASKS, "task")
     if place := device_named(device):
-        from ..gpu.reach_env import ReachDeviceEnv
+        from .reach_device_env import ReachDeviceEnv
 
         return ReachDeviceEnv(num_envs, place, **settings)
     from .reach_env import ReachVectorEnv  # Gymnasium is an extra

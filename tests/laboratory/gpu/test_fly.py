@@ -79,7 +79,7 @@ def test_nvrtc_compiles_the_program_for_devices(device: CpuDevice) -> None:
     hardware = {"sensors": "fine", "navigation": "filtered", "actuators": "wheels_and_thrusters"}
     fly_on_device([sr.Scenario(**hardware, duration=0.001).check()], device)
     for architecture in ("sm_80", "sm_90"):
-        binary = cuda.compiled(device.texts[0], architecture, (*cuda.FLAGS, "-G"))
+        binary = cuda.compiled(device.texts[0], architecture, (*cuda.NVRTC_FLAGS, "-G"))
         assert binary.startswith(b"\x7fELF")
     with pytest.raises(InputError, match=r"NVRTC cannot compile the flights: .*error"):
         cuda.compiled("int f( {", "sm_90")

@@ -33,7 +33,7 @@ from space_robot_model.elementary.matrices import (
     solve,
     unit_rows,
 )
-from space_robot_model.elementary.normal import normal_numbers, quantile
+from space_robot_model.elementary.normal import normal_numbers, normal_numbers_of_one, quantile
 from space_robot_model.elementary.rotations import (
     exact_sines_cosines,
     plain_sin_cos,
@@ -127,6 +127,9 @@ def test_normal_numbers_are_those_of_numpys_generator(seed: int, key: int, block
     draws = np.empty((8, 6))
     normal_numbers(draws, float(seed), key, block)
     np.testing.assert_array_equal(draws.ravel(), quantiles(shares))
+    one_by_one = np.empty((8, 6))
+    normal_numbers_of_one(one_by_one, float(seed), key, block)
+    np.testing.assert_array_equal(one_by_one, draws)
 
 
 Array = NDArray[np.float64]

@@ -11,7 +11,7 @@ from cpu_device import CpuDevice
 
 import space_robot as sr
 from space_robot.gpu import cuda
-from space_robot.gpu.reach_env import ReachDeviceEnv
+from space_robot.learning.reach_device_env import ReachDeviceEnv
 from space_robot_msgs_py.errors import InputError
 
 COUNT, M = 12, 9

@@ -16,17 +16,16 @@ from space_robot_msgs_py.config.arguments import as_whole_number
 from space_robot_msgs_py.errors import InputError
 from space_robot_sim.plant.tick import PlantMemory
 
-from ..learning.reach import Reach, begin_episode, draw_episode, step_alone
-from ..learning.reach_env import spaces, task_with
-from .device import Device, Memory
-from .structs import packed
-from .translation import Call, Translation, sizes_of
+from ..gpu.device import Device, Memory
+from ..gpu.structs import packed
+from ..gpu.translation import Call, Translation, sizes_of
+from .reach import Reach, begin_episode, draw_episode, step_alone
+from .reach_env import Info, spaces, task_with
 
 MOST_ENVS = 1 << 24
 LAST_SEED = (1 << 32) - 1
 GENERATOR = lang.TupleOf((lang.UINT,) * 4)
 """State of a generator of random numbers."""
-Info = dict[str, Any]
 
 
 class ReachDeviceEnv(VectorEnv[Memory, Any, Memory]):

@@ -4,13 +4,13 @@ Proximal policy optimisation (Schulman et al., arXiv:1707.06347) in one file, on
 environments step eight at a time on a processor, or by the ten thousands on an NVIDIA device, whose
 arrays PyTorch has without a copy; a flight has the same bits in both.
 
-    python examples/train_reach.py --device gpu                     # writes policy.npz
-    python examples/train_reach.py --envs 256 --iterations 150      # on two cores
-    python examples/train_reach.py --fly policy.npz                 # the policy as a law
+    python examples/learning/train_reach.py --device gpu                     # writes policy.npz
+    python examples/learning/train_reach.py --envs 256 --iterations 150      # on two cores
+    python examples/learning/train_reach.py --fly policy.npz                 # the policy as a law
 
 On the ROS graph it flies as any other law does, ``POLICY=policy.npz`` in the environment:
 
-    space-robot fly --controller examples/train_reach.py:PolicyLaw --duration 2
+    space-robot fly --controller examples/learning/train_reach.py:PolicyLaw --duration 2
 """
 
 from __future__ import annotations
