@@ -88,8 +88,10 @@ def train(device: str, count: int, iterations: int, seed: int) -> tuple[Any, lis
                 action = policy.sample()
                 after, reward, failed, truncated = step(action)
                 values = critic(state).squeeze(1)
-                # a failure costs all that is left at once, which no critic can learn
-                cost = (reward / per_step).clamp(min=-WORST)
+                # a failure costs all that is left at once, which no critic can learn; squares of
+                # small errors cost nothing, so their absolute values do
+                sharp = after[:, :axes].abs().mean(1)
+                cost = (reward / per_step - sharp).clamp(min=-WORST)
                 record = state, action, policy.log_prob(action).sum(1), cost, values
                 # a step after the end of an episode begins the next one, whatever the action
                 flags = failed, truncated, 1.0 - over

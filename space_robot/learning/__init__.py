@@ -16,25 +16,22 @@ if TYPE_CHECKING:
     from .reach_device_env import ReachDeviceEnv
     from .reach_env import ReachEnv, ReachVectorEnv
 
-TASKS = ("reach",)
-"""Names of the tasks."""
-
 
 def make(task: str, **settings: Any) -> ReachEnv:
-    """Return an environment of Gymnasium for the task "reach", see `reach_env.ReachEnv`.
+    """Return an environment of Gymnasium for a task, see `reach_env.ReachEnv`.
 
     Args:
-        task: one of `TASKS`.
+        task: "reach": the arm moves and the base keeps its attitude; or "point": it keeps the
+            direction of its z axis.
         settings: of the task, see `reach_env.ReachTask`.
 
     Raises:
         InputError: there is no such task, or a setting is out of its range.
         ImportError: Gymnasium is not installed.
     """
-    one_of(task, TASKS, "task")
-    from .reach_env import ReachEnv  # Gymnasium is an extra
+    from .reach_env import TASKS, ReachEnv  # Gymnasium is an extra
 
-    return ReachEnv(**settings)
+    return ReachEnv(**{**TASKS[one_of(task, TASKS, "task")], **settings})
 
 
 def make_vec(
@@ -49,11 +46,11 @@ def make_vec(
         device: ``gpu``: on an NVIDIA device, where all arrays stay, see `ReachDeviceEnv`.
         settings: see `make`.
     """
-    one_of(task, TASKS, "task")
+    from .reach_env import TASKS, ReachVectorEnv  # Gymnasium is an extra
+
+    settings = {**TASKS[one_of(task, TASKS, "task")], **settings}
     if place := device_named(device):
         from .reach_device_env import ReachDeviceEnv
 
         return ReachDeviceEnv(num_envs, place, **settings)
-    from .reach_env import ReachVectorEnv  # Gymnasium is an extra
-
     return ReachVectorEnv(num_envs, threads, **settings)

@@ -44,6 +44,8 @@ class Reach(Record):
     """Joint positions to be reached, rad or m."""
     attitude: Array = shaped(lambda n: (4,))
     """Attitude to be kept, unit quaternion."""
+    boresight: Array = shaped(lambda n: (3,))
+    """Direction on the base's axes, about which a turn costs nothing; zero: there is none."""
     scale: Array = shaped(lambda n: (n + 3,))
     """Torque of an action of 1, N m or N."""
     attitude_error: Array = shaped(lambda n: (4,))
@@ -89,10 +91,11 @@ def judge(reach: Reach, truth: State, fastest: float, ticks: int, period: float)
     What is left of a failed episode costs `WORST_COST` a second: an early end is no advantage.
     """
     observe(reach, truth)
-    n, out = reach.target.size, reach.observation
-    cost = 0.0
+    n, out, axis = reach.target.size, reach.observation, reach.boresight
+    cost, along = 0.0, out[0] * axis[0] + out[1] * axis[1] + out[2] * axis[2]
     for i in range(3):
-        cost += 4.0 * out[i] * out[i] + RATE_WEIGHT * out[3 + n + i] * out[3 + n + i]
+        across = out[i] - along * axis[i]
+        cost += 4.0 * across * across + RATE_WEIGHT * out[3 + n + i] * out[3 + n + i]
     for i in range(n):
         cost += out[3 + i] * out[3 + i] + RATE_WEIGHT * out[6 + n + i] * out[6 + n + i]
     for i in range(n + 3):

@@ -52,7 +52,7 @@ class ReachDeviceEnv(VectorEnv[Memory, Any, Memory]):
         self.metadata = {"autoreset_mode": AutoresetMode.NEXT_STEP}
         self._device, count, axes = device, self.num_envs, task.n + 3
         reach = Reach.block(task.n)
-        reach["scale"], reach["ticks"] = task.scale, task.ticks
+        task.describe(reach)
         translation = _translated(task.flight, task.begin.block)
         files, store = translation.files, device.store
         self._arrays = {

@@ -44,8 +44,10 @@ Info = dict[str, Any]
 
 MOST_ENVS, MOST_THREADS = 1 << 18, 1024
 """Largest numbers of environments, which take 4 KB each, and of threads."""
-NAME = "space_robot/Reach-v0"
-"""Name for `gymnasium.make` and `gymnasium.make_vec`, registered with this module."""
+TASKS: dict[str, dict[str, Any]] = {"reach": {}, "point": {"boresight": (0.0, 0.0, 1.0)}}
+"""The tasks, by their settings of `ReachTask`."""
+NAME, POINT_NAME = "space_robot/Reach-v0", "space_robot/Point-v0"
+"""Names for `gymnasium.make` and `gymnasium.make_vec`, registered with this module."""
 
 
 class Episode(NamedTuple):
@@ -68,6 +70,7 @@ class ReachTask:
         torque_scale: ArrayLike = 10.0,
         start_spread: float = 0.3,
         reach: float = 0.5,
+        boresight: ArrayLike | None = None,
     ) -> None:
         """Check the settings.
 
@@ -78,6 +81,8 @@ class ReachTask:
             torque_scale: torque, N m (prismatic joints: N), of an action of 1; scalar or (m,).
             start_spread: largest distance of a start from the scenario's, rad or m, each joint.
             reach: largest distance of a target from its start, rad or m, each joint.
+            boresight: direction on the base's axes that is to be kept; the base may turn about it.
+                None: the whole attitude is.
 
         Raises:
             InputError: a number is out of its range, or the scenario has what the task has not, as
@@ -102,6 +107,12 @@ class ReachTask:
         self.scale = np.broadcast_to(scale, (n + 3,))
         self.start_spread = _not_negative(start_spread, "start_spread")
         self.reach = _not_negative(reach, "reach")
+        self.boresight = np.zeros(3)
+        if boresight is not None:
+            axis = as_numbers(boresight, "boresight")
+            if axis.shape != (3,) or not 0.0 < (length := float(np.linalg.norm(axis))) < np.inf:
+                raise InputError(f"boresight: three numbers, not all 0, were expected, got {axis}")
+            self.boresight = axis / length
         self.begin = Plant(self.flight.robot, self.flight.plant_settings, self.period)
         """A plant at tick 0."""
         self.state_size = 13 + 2 * self.flight.robot.joint_count
@@ -118,8 +129,12 @@ class ReachTask:
         """Begin an episode in blocks (1,) of `PlantMemory` and `Reach`."""
         plant[:] = self.begin.block
         reach["start"], reach["target"] = episode
-        reach["scale"], reach["ticks"] = self.scale, self.ticks
+        self.describe(reach)
         begin_episode(plant, reach, self.period)
+
+    def describe(self, reach: Block) -> None:
+        """Write what all episodes have in common."""
+        reach["scale"], reach["ticks"], reach["boresight"] = self.scale, self.ticks, self.boresight
 
 
 def task_with(settings: Mapping[str, Any]) -> ReachTask:
@@ -164,7 +179,8 @@ class ReachEnv(gymnasium.Env[Array, Array]):
       joints, rad (or m); angular velocity of the base in its frame and joint rates, rad/s.
     - Action (m,): torque divided by ``torque_scale``, held over ``ticks_per_step`` ticks.
     - Reward: -cost dt with the cost per second
-      ``4 |e_eps|^2 + |e_theta|^2 + 0.1 |omega, thetadot|^2 + 0.001 |action|^2``.
+      ``4 |e_eps|^2 + |e_theta|^2 + 0.1 |omega, thetadot|^2 + 0.001 |action|^2``. With a
+      ``boresight`` e_eps is the part across it.
     - Terminated: the cost is 100 or more, or the flight has diverged; what is left of the episode
       then costs 100 per second. Truncated: after ``duration``.
     """
@@ -348,9 +364,11 @@ def _motor_work(plant: Plant) -> InLanes:
     return records
 
 
-if NAME not in gymnasium.registry:
-    gymnasium.register(
-        NAME,
-        f"{__name__}:{ReachEnv.__name__}",
-        vector_entry_point=f"{__name__}:{ReachVectorEnv.__name__}",
-    )
+for _name, _settings in zip((NAME, POINT_NAME), TASKS.values(), strict=True):
+    if _name not in gymnasium.registry:
+        gymnasium.register(
+            _name,
+            f"{__name__}:{ReachEnv.__name__}",
+            kwargs=_settings,
+            vector_entry_point=f"{__name__}:{ReachVectorEnv.__name__}",
+        )

@@ -87,6 +87,20 @@ def test_an_episode_is_a_second_of_steps_with_rewards_below_zero() -> None:
         env.step(np.zeros(9))
 
 
+@pytest.mark.parametrize(("task", "counted"), [("reach", [0, 1, 2]), ("point", [0, 1])])
+def test_the_reward_counts_the_attitude_or_the_boresight_alone(
+    task: str, counted: list[int]
+) -> None:
+    env, seconds = sr.make(task, duration=1.0, ticks_per_step=400), 0.2
+    env.reset(seed=1)
+    env.step(np.array([50.0] * 3 + [0.0] * 6))
+    observation, reward = env.step(np.zeros(9))[:2]
+    assert abs(observation[2]) > 1e-3
+    attitude, joints, rates = observation[counted], observation[3:9], observation[9:]
+    cost = 4.0 * attitude @ attitude + joints @ joints + 0.1 * rates @ rates
+    assert reward == pytest.approx(-cost * seconds, rel=1e-12)
+
+
 def test_a_failure_costs_the_rest_of_the_episode() -> None:
     env, total, failed, truncated = ReachEnv(duration=1.0, torque_scale=1e6), 0.0, False, False
     env.reset(seed=0)
@@ -108,6 +122,7 @@ def test_a_failure_costs_the_rest_of_the_episode() -> None:
         ({"scenario": 3}, "scenario: a Scenario was expected"),
         ({"duration": 0.0}, "duration: a number above 0 was expected"),
         ({"reach": -1.0}, "reach: a number 0 or more was expected"),
+        ({"boresight": [0.0, 0.0, 0.0]}, "boresight: three numbers, not all 0"),
         ({"ticks_per_step": 0}, "ticks_per_step"),
         ({"torque_scale": [1.0, 2.0]}, "torque_scale: 1 or 9 numbers above 0"),
         ({"foo": 1}, "unknown setting 'foo' of the task reach: choose one of"),
