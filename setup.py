@@ -102,7 +102,7 @@ setup(
             "ruff",  # wraps the signatures
             "ziamath",
         ],
-        "gpu": ["cuda-bindings>=12.9", "nvidia-cuda-nvrtc>=13"],  # flights on NVIDIA devices
+        "gpu": ["cuda-bindings>=13", "nvidia-cuda-nvrtc>=13"],  # flights on NVIDIA devices
         "gym": ["gymnasium>=1.0"],  # space_robot.api.gymnasium_env
         "mpc": ["daqp>=0.8"],  # examples/mpc_law.py
         "mutation": ["cosmic-ray"],  # tools/mutation
@@ -118,7 +118,7 @@ setup(
             "build>=1.2",
             "cvxpy",
             "catkin_pkg",  # ROS's generators of interfaces
-            "cuda-bindings>=12.9",
+            "cuda-bindings>=13",
             "daqp>=0.8",
             "distributed>=2024.1",
             "gymnasium>=1.0",

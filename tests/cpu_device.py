@@ -22,13 +22,13 @@ class CpuMemory(Memory):
 
     kind = CPU
 
-    def __init__(self, array: NDArray[Any]) -> None:
-        self.array = np.ascontiguousarray(array).copy()
+    def __init__(self, shape: tuple[int, ...], dtype: Any) -> None:
+        self.array = np.empty(shape, dtype)
         self.pointer = self.array.ctypes.data
         self.shape, self.dtype = self.array.shape, self.array.dtype
 
-    def read(self) -> NDArray[Any]:
-        return self.array.copy()
+    def read(self, rows: int | None = None) -> NDArray[Any]:
+        return self.array[:rows].copy()
 
     def write(self, array: NDArray[Any], first: int = 0) -> None:
         self.array[first : first + len(array)] = array
@@ -39,6 +39,10 @@ class CpuProgram(DeviceProgram):
 
     def __init__(self, library: ctypes.CDLL) -> None:
         self._library = library
+
+    @property
+    def reserved_bytes(self) -> int:
+        return 0
 
     def run(self, function: str, count: int, argument: Memory) -> None:
         self._library[function](ctypes.c_void_p(argument.pointer))
@@ -62,8 +66,8 @@ class CpuDevice(Device):
             subprocess.run(["g++", *FLAGS, str(source), "-o", str(library)], check=True)
             return CpuProgram(ctypes.CDLL(str(library)))
 
-    def store(self, array: NDArray[Any]) -> Memory:
-        return CpuMemory(array)
+    def reserve(self, shape: tuple[int, ...], dtype: Any) -> Memory:
+        return CpuMemory(shape, dtype)
 
     @property
     def free_bytes(self) -> int:

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import ctypes
 import hashlib
+import math
 import weakref
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -16,20 +18,18 @@ from numpy.typing import NDArray
 
 from space_robot_msgs_py.compiled.cache import cache_directory
 from space_robot_msgs_py.config.installation import install_command
-from space_robot_msgs_py.errors import InputError, SpaceRobotError
+from space_robot_msgs_py.errors import InputError
 
 from ..console.files import atomic_file
-from .device import Device, DeviceProgram, Memory
+from .device import Device, DeviceError, DeviceProgram, Memory
 from .dlpack import CUDA
 
 THREADS = 64
 """Of a block: the flights of a small batch are spread over the device."""
 NVRTC_FLAGS = ("--fmad=false", "--std=c++17")
 """No fused operations: the bits are those of the operations as they are written."""
-
-
-class DeviceError(SpaceRobotError):
-    """A device has failed."""
+OLDEST_DRIVER, ITS_NUMBER = 13_000, "580"
+"""The oldest driver, as CUDA and as NVIDIA number it."""
 
 
 @cache
@@ -39,18 +39,26 @@ def find_device() -> Device:
     Raises:
         InputError: there is none that can be used; says why.
     """
+    how = install_command("gpu")
     try:
-        from cuda.bindings import driver, nvrtc  # noqa: F401
+        from cuda.bindings import driver, nvrtc
     except ImportError:
-        how = install_command("gpu")
         raise InputError(f"device gpu: cuda-bindings is not installed: {how}") from None
     try:
+        _checked(nvrtc.nvrtcVersion())
+    except RuntimeError:  # of the bindings, which have not found its library
+        raise InputError(f"device gpu: nvidia-cuda-nvrtc is not installed: {how}") from None
+    why = "its driver is not installed on this computer"
+    try:
         _checked(driver.cuInit(0))
+        if (version := _checked(driver.cuDriverGetVersion())) < OLDEST_DRIVER:
+            has = f"{version // 1000}.{version % 1000 // 10}"
+            why = f"its driver is made for CUDA {has}, {ITS_NUMBER} or newer is needed"
+            raise DeviceError(why)
         return CudaDevice(_checked(driver.cuDeviceGet(0)))
     except DeviceError as error:
         raise InputError(f"device gpu: no NVIDIA device can be used: {error}") from None
-    except RuntimeError:  # of the bindings, which have not found the driver's library
-        why = "its driver is not installed on this computer"
+    except RuntimeError:  # of the bindings, which have not found its library
         raise InputError(f"device gpu: no NVIDIA device can be used: {why}") from None
 
 
@@ -69,24 +77,31 @@ class CudaDevice(Device):
         """Take a device of the driver."""
         from cuda.bindings import driver
 
-        self._driver = driver
+        self.driver = driver
         self._context = _checked(driver.cuDevicePrimaryCtxRetain(number))
-        self.use()
         name = _checked(driver.cuDeviceGetName(96, number))
         self.name = name.split(b"\0")[0].decode()
-        kind = driver.CUdevice_attribute
-        major, minor = (
-            _checked(driver.cuDeviceGetAttribute(attribute, number))
-            for attribute in (
-                kind.CU_DEVICE_ATTRIBUTE_COMPUTE_CAPABILITY_MAJOR,
-                kind.CU_DEVICE_ATTRIBUTE_COMPUTE_CAPABILITY_MINOR,
-            )
-        )
-        self.architecture = f"sm_{major}{minor}"
+        kinds = driver.CUdevice_attribute
 
-    def use(self) -> None:
-        """Make it the device of this thread."""
-        _checked(self._driver.cuCtxSetCurrent(self._context))
+        def attribute(name: str) -> int:
+            kind = getattr(kinds, f"CU_DEVICE_ATTRIBUTE_{name}")
+            return int(_checked(driver.cuDeviceGetAttribute(kind, number)))
+
+        major, minor = (attribute(f"COMPUTE_CAPABILITY_{part}") for part in ("MAJOR", "MINOR"))
+        self.architecture = f"sm_{major}{minor}"
+        self.threads = attribute("MULTIPROCESSOR_COUNT")
+        self.threads *= attribute("MAX_THREADS_PER_MULTIPROCESSOR")
+        """That run at a time at most."""
+        self._programs: dict[str, CudaProgram] = {}
+
+    @contextmanager
+    def current(self) -> Iterator[Any]:
+        """Make it the device of this thread for a while; yields the driver's functions."""
+        _checked(self.driver.cuCtxPushCurrent(self._context))
+        try:
+            yield self.driver
+        finally:
+            self.driver.cuCtxPopCurrent()
 
     def compile(self, text: str) -> DeviceProgram:
         """Compile a program, or take it from the cache of compiled kernels.
@@ -94,29 +109,29 @@ class CudaDevice(Device):
         Raises:
             InputError: the compiler refuses it.
         """
-        self.use()
-        file = program_file(text, self.architecture)
-        if not file.exists():
-            click.echo(
-                f"compiling the flights' program for {self.name} (once for a robot and a law, "
-                "up to a minute) ...",
-                err=True,
-            )
-            file.parent.mkdir(parents=True, exist_ok=True)
-            with atomic_file(file, replace=True) as cubin:
-                cubin.write(compiled(text, self.architecture))
-        return CudaProgram(self, _checked(self._driver.cuModuleLoadData(file.read_bytes())))
+        if text not in self._programs:
+            file = program_file(text, self.architecture)
+            if not file.exists():
+                click.echo(
+                    f"compiling the flights' program for {self.name} (once for a robot and a law, "
+                    "up to a minute) ...",
+                    err=True,
+                )
+                file.parent.mkdir(parents=True, exist_ok=True)
+                with atomic_file(file, replace=True) as cubin:
+                    cubin.write(compiled(text, self.architecture))
+            self._programs[text] = CudaProgram(self, file.read_bytes())
+        return self._programs[text]
 
-    def store(self, array: NDArray[Any]) -> Memory:
-        """Return a copy of an array on the device."""
-        self.use()
-        return CudaMemory(self._driver, np.ascontiguousarray(array))
+    def reserve(self, shape: tuple[int, ...], dtype: Any) -> Memory:
+        """Return an array of any numbers on the device."""
+        return CudaMemory(self, shape, np.dtype(dtype))
 
     @property
     def free_bytes(self) -> int:
         """Memory that is free."""
-        self.use()
-        free, _ = _checked(self._driver.cuMemGetInfo())
+        with self.current() as driver:
+            free, _ = _checked(driver.cuMemGetInfo())
         return int(free)
 
 
@@ -125,37 +140,67 @@ class CudaMemory(Memory):
 
     kind = CUDA
 
-    def __init__(self, driver: Any, array: NDArray[Any]) -> None:
-        """Copy an array."""
-        self._driver, self.dtype, self.shape = driver, array.dtype, array.shape
-        self._bytes = max(array.nbytes, 1)
-        self._row = array.itemsize * int(np.prod(array.shape[1:], dtype=int))
-        self._address = _checked(driver.cuMemAlloc(self._bytes))
-        self.pointer = int(self._address)
-        self._end = weakref.finalize(self, driver.cuMemFree, self._address)
-        self.write(array)
+    def __init__(self, device: CudaDevice, shape: tuple[int, ...], dtype: np.dtype[Any]) -> None:
+        """Reserve the memory.
 
-    def read(self) -> NDArray[Any]:
-        """Return the numbers."""
-        array = np.empty(self.shape, self.dtype)
+        Raises:
+            DeviceError: there is too little.
+        """
+        self._device, self.shape, self.dtype = device, shape, dtype
+        self._row = dtype.itemsize * math.prod(shape[1:])
+        with device.current() as driver:
+            # whole words, and some for an array without numbers
+            size = max(8, dtype.itemsize * math.prod(shape))
+            self.pointer = int(_checked(driver.cuMemAlloc(size)))
+        weakref.finalize(self, _free, device, self.pointer)
+
+    @property
+    def __cuda_array_interface__(self) -> dict[str, Any]:
+        """The array for libraries that know no DLPack."""
+        interface = {"shape": self.shape, "typestr": self.dtype.str, "version": 3}
+        return {**interface, "data": (self.pointer, False), "strides": None, "stream": None}
+
+    def read(self, rows: int | None = None) -> NDArray[Any]:
+        """Return the numbers, of the first ``rows`` (None: of all)."""
+        array = np.empty(self.shape if rows is None else (rows, *self.shape[1:]), self.dtype)
         if array.nbytes:
-            _checked(self._driver.cuMemcpyDtoH(array.ctypes.data, self._address, array.nbytes))
+            with self._device.current() as driver:
+                place = driver.CUdeviceptr(self.pointer)
+                _checked(driver.cuMemcpyDtoH(array.ctypes.data, place, array.nbytes))
         return array
 
     def write(self, array: NDArray[Any], first: int = 0) -> None:
         """Overwrite rows from ``first`` on."""
-        numbers = np.ascontiguousarray(array)
+        numbers = np.ascontiguousarray(array, self.dtype)
         if numbers.nbytes:
-            place = self._driver.CUdeviceptr(self.pointer + first * self._row)
-            _checked(self._driver.cuMemcpyHtoD(place, numbers.ctypes.data, numbers.nbytes))
+            with self._device.current() as driver:
+                place = driver.CUdeviceptr(self.pointer + first * self._row)
+                _checked(driver.cuMemcpyHtoD(place, numbers.ctypes.data, numbers.nbytes))
+
+
+def _free(device: CudaDevice, pointer: int) -> None:
+    with device.current() as driver:
+        driver.cuMemFree(driver.CUdeviceptr(pointer))
 
 
 class CudaProgram(DeviceProgram):
     """A program on an NVIDIA device."""
 
-    def __init__(self, device: CudaDevice, module: Any) -> None:
-        """Take a module that is loaded."""
-        self._device, self._module = device, module
+    def __init__(self, device: CudaDevice, cubin: bytes) -> None:
+        """Load a compiled program; it stays as long as the process."""
+        self._device = device
+        with device.current() as driver:
+            self._module = _checked(driver.cuModuleLoadData(cubin))
+
+    @property
+    def reserved_bytes(self) -> int:
+        """Memory that the device keeps for local variables: for all threads that it can run."""
+        with self._device.current() as driver:
+            count = _checked(driver.cuModuleGetFunctionCount(self._module))
+            kernels = _checked(driver.cuModuleEnumerateFunctions(count, self._module))
+            kind = driver.CUfunction_attribute.CU_FUNC_ATTRIBUTE_LOCAL_SIZE_BYTES
+            each = [_checked(driver.cuFuncGetAttribute(kind, kernel)) for kernel in kernels]
+        return int(max(each) * self._device.threads)
 
     def run(self, function: str, count: int, argument: Memory) -> None:
         """Run a function of one argument by ``count`` threads, and wait for all of them.
@@ -163,12 +208,12 @@ class CudaProgram(DeviceProgram):
         Raises:
             DeviceError: the device has failed.
         """
-        self._device.use()
-        driver = self._device._driver
-        kernel = _checked(driver.cuModuleGetFunction(self._module, function.encode()))
-        blocks, arguments = -(-count // THREADS), ((argument.pointer,), (ctypes.c_void_p,))
-        _checked(driver.cuLaunchKernel(kernel, blocks, 1, 1, THREADS, 1, 1, 0, 0, arguments, 0))
-        _checked(driver.cuCtxSynchronize())
+        with self._device.current() as driver:
+            kernel = _checked(driver.cuModuleGetFunction(self._module, function.encode()))
+            blocks, arguments = -(-count // THREADS), ((argument.pointer,), (ctypes.c_void_p,))
+            _checked(driver.cuCtxSynchronize())  # other libraries may still write what is read
+            _checked(driver.cuLaunchKernel(kernel, blocks, 1, 1, THREADS, 1, 1, 0, 0, arguments, 0))
+            _checked(driver.cuCtxSynchronize())
 
 
 def program_file(text: str, architecture: str) -> Path:
@@ -189,13 +234,17 @@ def compiled(text: str, architecture: str, flags: Sequence[str] = NVRTC_FLAGS) -
     from cuda.bindings import nvrtc
 
     program = _checked(nvrtc.nvrtcCreateProgram(text.encode(), b"flights.cu", 0, [], []))
-    options = [flag.encode() for flag in (*flags, f"--gpu-architecture={architecture}")]
-    (status,) = nvrtc.nvrtcCompileProgram(program, len(options), options)
-    if status.value:
-        log = bytes(_checked(nvrtc.nvrtcGetProgramLogSize(program)))
-        _checked(nvrtc.nvrtcGetProgramLog(program, log))
-        errors = [line for line in log.decode().splitlines() if "error" in line]
-        raise InputError(f"device gpu: NVRTC cannot compile the flights: {'; '.join(errors[:3])}")
-    cubin = bytes(_checked(nvrtc.nvrtcGetCUBINSize(program)))
-    _checked(nvrtc.nvrtcGetCUBIN(program, cubin))
+    try:
+        options = [flag.encode() for flag in (*flags, f"--gpu-architecture={architecture}")]
+        (status,) = nvrtc.nvrtcCompileProgram(program, len(options), options)
+        if status.value:
+            log = bytes(_checked(nvrtc.nvrtcGetProgramLogSize(program)))
+            _checked(nvrtc.nvrtcGetProgramLog(program, log))
+            errors = [line for line in log.decode().splitlines() if "error" in line]
+            why = "; ".join(errors[:3])
+            raise InputError(f"device gpu: NVRTC cannot compile the flights: {why}")
+        cubin = bytes(_checked(nvrtc.nvrtcGetCUBINSize(program)))
+        _checked(nvrtc.nvrtcGetCUBIN(program, cubin))
+    finally:
+        nvrtc.nvrtcDestroyProgram(program)
     return cubin

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import itertools
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,8 @@ CPU, CUDA = 1, 2
 """Kinds of devices."""
 CODES = {"i": 0, "u": 1, "f": 2, "b": 6}
 """Of the types of numbers, by NumPy's."""
-NAME = b"dltensor"
+UNUSED = b"dltensor"
+"""Name of a capsule that no library has taken yet."""
 
 
 class _Tensor(ctypes.Structure):
@@ -33,14 +35,30 @@ class _Managed(ctypes.Structure):
     _fields_ = (("tensor", _Tensor), ("context", ctypes.c_void_p), ("delete", ctypes.c_void_p))
 
 
-_DELETER = ctypes.CFUNCTYPE(None, ctypes.c_void_p)
 _in_use: dict[int, tuple[Any, ...]] = {}
-"""What the consumers of capsules need, by the capsules' addresses."""
+"""What those who have taken capsules need, by address."""
+_api = ctypes.pythonapi
+_api.PyCapsule_New.restype = ctypes.py_object
+_api.PyCapsule_New.argtypes = (ctypes.c_void_p, ctypes.c_char_p, ctypes.c_void_p)
+_api.PyCapsule_IsValid.argtypes = (ctypes.c_void_p, ctypes.c_char_p)
+_api.PyCapsule_GetPointer.restype = ctypes.c_void_p
+_api.PyCapsule_GetPointer.argtypes = (ctypes.c_void_p, ctypes.c_char_p)
 
 
-@_DELETER  # type: ignore[untyped-decorator,unused-ignore]
-def _delete(address: int) -> None:
-    _in_use.pop(address, None)
+def _delete(address: int, in_use: dict[int, tuple[Any, ...]] = _in_use) -> None:
+    in_use.pop(address, None)
+
+
+def _end(capsule: int, api: Any = _api, in_use: dict[int, tuple[Any, ...]] = _in_use) -> None:
+    if api.PyCapsule_IsValid(capsule, UNUSED):  # nobody else deletes it
+        in_use.pop(api.PyCapsule_GetPointer(capsule, UNUSED), None)
+
+
+# libraries may call them when the interpreter ends
+_CALLBACKS = [ctypes.CFUNCTYPE(None, ctypes.c_void_p)(call) for call in (_delete, _end)]
+_DELETE, _END = (ctypes.cast(callback, ctypes.c_void_p) for callback in _CALLBACKS)
+for _callback in _CALLBACKS:
+    _api.Py_IncRef(ctypes.py_object(_callback))
 
 
 def capsule(
@@ -55,17 +73,11 @@ def capsule(
         dtype: of its numbers.
         kind: `CPU` or `CUDA`.
     """
-    sizes = (ctypes.c_int64 * len(shape))(*shape)
-    managed = _Managed()
-    managed.tensor = _Tensor(
-        pointer, kind, 0, len(shape), CODES[dtype.kind], 8 * dtype.itemsize, 1, sizes, None, 0
-    )
-    managed.delete = ctypes.cast(_delete, ctypes.c_void_p)
+    steps = list(itertools.accumulate((1, *shape[:0:-1]), lambda a, b: a * b))[::-1]
+    sizes, strides = ((ctypes.c_int64 * len(shape))(*numbers) for numbers in (shape, steps))
+    code, bits = CODES[dtype.kind], 8 * dtype.itemsize
+    tensor = _Tensor(pointer, kind, 0, len(shape), code, bits, 1, sizes, strides, 0)
+    managed = _Managed(tensor, None, _DELETE)
     address = ctypes.addressof(managed)
-    _in_use[address] = owner, managed, sizes
-    make = ctypes.pythonapi.PyCapsule_New
-    make.restype, make.argtypes = (
-        ctypes.py_object,
-        (ctypes.c_void_p, ctypes.c_char_p, ctypes.c_void_p),
-    )
-    return make(address, NAME, None)
+    _in_use[address] = owner, managed, sizes, strides
+    return _api.PyCapsule_New(address, UNUSED, _END)

@@ -9,12 +9,15 @@ import click
 from space_robot_msgs_py.config.validation import one_of
 
 from ..flight.batch import FlownInBatch
+from ..flight.flown_log import row_bytes
 from ..flight.plan import Flight
-from .device import Device
+from .device import Device, DeviceError
 
 DEVICES = ("cpu", "gpu")
 MOST_FLIGHTS = 512
-"""Of a batch: their logs are in this computer's memory, 5 MB for a second of each."""
+"""Of a batch."""
+HOST_BYTES = 4 << 30
+"""Of a batch: its logs on this computer."""
 RESERVE = 0.8
 """Share of the free memory that a batch may take."""
 
@@ -49,16 +52,21 @@ def fly_on_device(
         progress: called with the number of flights that are over.
 
     Raises:
-        InputError: a kernel has no translation, or the memory is too small for one flight.
+        InputError: a kernel has no translation.
+        DeviceError: the device has failed, or its memory is too small for one flight.
     """
     from .batch import LOG_BYTES, DeviceBatch  # the translator is for those who use it
 
     flown: list[FlownInBatch] = []
-    size = min(len(flights), MOST_FLIGHTS)
+    of_log = max(1, flights[0].ticks * row_bytes(flights[0]))
+    size = max(1, min(len(flights), MOST_FLIGHTS, HOST_BYTES // of_log))
     while len(flown) < len(flights):
         part = flights[len(flown) : len(flown) + size]
         batch = DeviceBatch(part, device, is_brief)
-        if batch.device_bytes > RESERVE * device.free_bytes - LOG_BYTES and len(part) > 1:
+        if (needed := batch.device_bytes) > RESERVE * device.free_bytes - LOG_BYTES:
+            if len(part) == 1:
+                free = f"{device.free_bytes / 1e9:.1f} GB of {device.name} are free"
+                raise DeviceError(f"device gpu: a flight needs {needed / 1e9:.1f} GB: {free}")
             size = max(1, len(part) // 2)
             click.echo(f"device gpu: little memory is free: {size} flights at a time", err=True)
             continue

@@ -35,10 +35,11 @@ from ..flight.plan import Flight
 
 Call = tuple[Any, tuple[lang.Value, ...]]
 """A kernel and its arguments."""
-Parts = Mapping[type[Record], NDArray[Any]]
-"""Blocks (F,) of the flights' records, by kind."""
+Parts = Sequence[tuple[type[Record], NDArray[Any]]]
+"""Records, and blocks (F,) of them."""
 OF_THE_LOOP = (PlantMemory, ControllerMemory)
-"""Records whose numbers may be known; gains are not, so that other gains need no other program."""
+"""Records whose structs have what is used only. Numbers of others, of laws, are never known, so
+that other gains need no other program."""
 
 
 class Cuda(lang.C99):
@@ -59,6 +60,7 @@ class Translation:
         self,
         calls: Mapping[str, Call],
         parts: Parts,
+        records: Iterable[type[Record]],
         sizes: Mapping[str, int],
         joints: int,
         varying: Iterable[lang.FieldName] = (),
@@ -72,13 +74,14 @@ class Translation:
 
         Args:
             calls: kernels by name.
-            parts: memory before the first tick.
+            parts: memory before the first tick, and after events.
+            records: that have structs.
             sizes: capacities of arrays, by the constants' names.
             joints: n.
             varying: fields that may change between kernels, though they are the same now.
             kept: fields that structs have though no kernel reads them.
         """
-        self._written = set(varying)
+        self._written, self._records = set(varying), list(records)
         while True:
             self.program = KernelProgram(
                 sizes, joints, Cuda(), {normal_numbers: normal_numbers_of_one}
@@ -94,15 +97,13 @@ class Translation:
             if not more:
                 break
             self._written |= more
-        whole = [State, Reference, *(record for record in parts if record not in OF_THE_LOOP)]
+        whole = [State, Reference, *(r for r in self._records if r not in OF_THE_LOOP)]
         self.files = Files(self.program, list(self.roots.values()), whole, lambda module: "loop")
         self.files.fields |= set(kept)
-        self._records = list(parts)
 
     def constants_of(self, parts: Parts) -> dict[lang.FieldName, float]:
         """Return the fields that are known, of memory between two stretches."""
-        blocks = [(record, block) for record, block in parts.items() if record in OF_THE_LOOP]
-        constants = constant_fields(self.program, blocks, self._written)
+        constants = constant_fields(self.program, parts, self._written)
         zero = np.float64(0.0).tobytes()
 
         def is_known(record: type[Record], name: str, number: float) -> bool:

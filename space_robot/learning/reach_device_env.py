@@ -148,8 +148,8 @@ def _translated(flight: Any, plant: NDArray[Any]) -> Translation:
         "begin_episode": (begin_episode, (plants, reaches, number)),
         "step": (step_alone, (plants, buffer, reaches, whole, number)),
     }
-    parts = {PlantMemory: plant, Reach: Reach.block(flight.robot.n)}
-    return Translation(calls, parts, sizes_of(flight), flight.robot.n)
+    parts, records = [(PlantMemory, plant)], (PlantMemory, Reach)
+    return Translation(calls, parts, records, sizes_of(flight), flight.robot.n)
 
 
 def _text(translation: Translation, numbers: int, axes: int) -> str:

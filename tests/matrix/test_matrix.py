@@ -214,7 +214,9 @@ def test_it_flies_on_a_device(plan: Planned, flown: Get) -> None:
     assert difference(block.log, expected.log) == ""
     assert block.log.laws == expected.log.laws
     assert block.ending.reason == expected.reason
-    assert flights[1].plant.truth.block.tobytes() == expected.flight.plant.truth.block.tobytes()
+    for part in ("truth", "state"):
+        left, wanted = (getattr(f.plant, part).block for f in (flights[1], expected.flight))
+        assert left.tobytes() == wanted.tobytes()
     assert len(device.texts) == 1
 
 

@@ -21,6 +21,7 @@ from space_robot_msgs_py.errors import FlightError, InputError
 from ...console.files import make_folder
 from ...flight.ending import DIVERGED, FAILED, UNANSWERED
 from ...flight.simulate import simulate
+from ...gpu.device import DeviceError
 from ...gpu.fly import MOST_FLIGHTS
 from ...processes.executor import OutOfTimeError, WorkerDiedError, run_many
 from ..row.fly import BatchFlyer, RowFlyer
@@ -130,6 +131,8 @@ class Flights:
             on_progress(self._progress)
             for done in running:
                 rows, first = done.result, done.item[0]
+                if isinstance(done.error, DeviceError):  # it would fail for the others, too
+                    raise done.error
                 if rows is None and len(done.item) > 1:
                     batches.repeat_singly(done.item)  # only the one to blame gets no result
                     continue

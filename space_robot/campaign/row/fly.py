@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import lru_cache, partial
 
@@ -16,6 +15,7 @@ from ...analysis.own_metric import MetricError, listed_metrics
 from ...flight.batch import batches, fly_group
 from ...flight.ending import FAILED, Ending
 from ...flight.plan import Flight
+from ...gpu.device import DeviceError
 from ...gpu.fly import MOST_FLIGHTS, device_named, fly_on_device
 from ..draws import Draws
 from ..study import Study
@@ -68,6 +68,9 @@ class RowFlyer:
 
         Those that can share a batch fly in lanes, or on the device; each row is the one of the
         task alone.
+
+        Raises:
+            DeviceError: the device has failed.
         """
         rows: list[Row] = []
         flights: list[Flight] = []
@@ -85,13 +88,17 @@ class RowFlyer:
         for group in batches(enumerate(flights), MOST_FLIGHTS if device else WIDTH):
             numbers = [number for number, _ in group]
             if len(group) > 1:
-                with suppress(Exception):  # of one of them, whose own row says it
+                try:
                     sharing = [flight for _, flight in group]
                     rows += [
                         self.measured_row(flown[numbers[k]], sharing[k], ending, log)
                         for k, log, ending in fly(sharing, is_brief=is_brief)
                     ]
                     continue
+                except DeviceError:
+                    raise
+                except Exception:
+                    pass  # of one of them, whose own row says it
             rows += [self(flown[k]) for k in numbers]
         return rows
 

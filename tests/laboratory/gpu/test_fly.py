@@ -8,13 +8,14 @@ from typing import Any
 import numpy as np
 import pytest
 from click.testing import CliRunner
-from cpu_device import CpuDevice
+from cpu_device import CpuDevice, CpuProgram
 from matrix.scenarios import difference
 
 import space_robot as sr
 from space_robot.cli.main import cli
-from space_robot.gpu import cuda
-from space_robot.gpu.fly import fly_on_device
+from space_robot.gpu import batch, cuda, dlpack
+from space_robot.gpu.device import DeviceError
+from space_robot.gpu.fly import RESERVE, fly_on_device
 from space_robot_msgs_py.errors import InputError
 
 STUDY: dict[str, Any] = {
@@ -62,16 +63,58 @@ def test_a_campaign_has_the_same_table(device: CpuDevice) -> None:
     assert len(device.texts) == 2
 
 
+def test_laws_that_remember_alike_keep_memories_of_their_own(
+    device: CpuDevice, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Both have integrals, in records of one class, over many launches."""
+    monkeypatch.setattr(batch, "MOST_STRETCH", 7)
+    scenario = sr.Scenario(controller="pd", swaps=["0.02:ctc", "0.03:pd"], duration=0.04)
+    laws = scenario.check().laws
+    gains = {name: {**laws[name].gain_values, "k_i": [50.0] * 9} for name in ("pd", "ctc")}
+    scenario = scenario.replace(gains=gains, parameters={"plant": {"friction.coulomb": 5.0}})
+    (flown,) = fly_on_device([scenario.check()], device)
+    assert difference(flown.log, scenario.fly().log) == ""
+
+
 def test_fewer_fly_at_a_time_where_memory_is_little(capsys: pytest.CaptureFixture[str]) -> None:
-    flights = [sr.Scenario(seed=k, sensors="fine", duration=0.01).check() for k in range(4)]
-    log = 1 << 30
-    small = CpuDevice(int((log + 300_000) / 0.8))
+    scenario = sr.Scenario(sensors="fine", duration=0.01)
+    flights = [scenario.replace(seed=k).check() for k in range(4)]
+    small = CpuDevice(int((batch.LOG_BYTES + 300_000) / RESERVE))
     flown = fly_on_device(flights, small)
     assert [one.flight for one in flown] == [0, 1, 2, 3]
     assert "little memory is free: 2 flights at a time" in capsys.readouterr().err
     for one, seed in zip(flown, range(4), strict=True):
-        expected = sr.Scenario(seed=seed, sensors="fine", duration=0.01).fly()
+        expected = scenario.replace(seed=seed).fly()
         assert np.array_equal(one.log.commanded_torque, expected.log.commanded_torque)
+    with pytest.raises(DeviceError, match=r"a flight needs 0\.0 GB: 1\.0 GB of this processor"):
+        fly_on_device(flights, CpuDevice(1_000_000_000))
+
+
+def test_a_device_that_fails_ends_a_campaign_in_one_line(
+    device: CpuDevice, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It does not fly on, one by one, without it."""
+
+    def fail(*_: Any) -> None:
+        raise DeviceError("launch failed")
+
+    monkeypatch.setattr(CpuProgram, "run", fail)
+    with pytest.raises(DeviceError, match="launch failed"):
+        sr.Campaign.of(STUDY).run(workers=0, device="gpu")
+
+
+def test_arrays_are_given_without_a_copy_and_freed() -> None:
+    memory = CpuDevice().store(np.arange(6.0).reshape(2, 3))
+    array = np.from_dlpack(memory)
+    memory.write(np.ones((1, 3)), 1)
+    assert np.array_equal(array, [[0.0, 1.0, 2.0], [1.0, 1.0, 1.0]])
+    assert len(dlpack._in_use) == 1
+    refused = memory.__dlpack__()
+    assert len(dlpack._in_use) == 2
+    del array, refused
+    assert not dlpack._in_use
+    with pytest.raises(BufferError, match="without a copy"):
+        memory.__dlpack__(copy=True)
 
 
 def test_nvrtc_compiles_the_program_for_devices(device: CpuDevice) -> None:
@@ -91,6 +134,7 @@ def test_no_device_is_one_line_and_exit_code_2(monkeypatch: pytest.MonkeyPatch) 
     result = CliRunner().invoke(cli, ["campaign", "run", "first", "--device", "gpu"])
     assert isinstance(result.exception, InputError)
     assert str(result.exception).startswith("device gpu: cuda-bindings is not installed: pip")
+    cuda.find_device.cache_clear()
 
 
 def test_a_wrong_device_is_told() -> None:

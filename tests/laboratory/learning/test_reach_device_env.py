@@ -46,6 +46,14 @@ def test_episodes_have_the_bits_of_those_here(there: ReachDeviceEnv) -> None:
     assert np.array_equal(here.reset()[0], np.from_dlpack(there.reset()[0]))
 
 
+def test_nvrtc_compiles_the_program() -> None:
+    pytest.importorskip("cuda.bindings.nvrtc")
+    device = CpuDevice()
+    ReachDeviceEnv(1, device)
+    binary = cuda.compiled(device.texts[0], "sm_90", (*cuda.NVRTC_FLAGS, "-G"))
+    assert binary.startswith(b"\x7fELF")
+
+
 def test_an_array_of_the_device_is_not_copied(there: ReachDeviceEnv) -> None:
     there.reset(seed=3)
     observations = np.from_dlpack(there.observations)
