@@ -36,7 +36,7 @@ CONFIG = [
 # `space-robot examples` shows and copies them.
 EXAMPLES = [
     (f"share/{NAME}/{path.parent}", [str(path)])
-    for folder in ("examples", "examples/flight_computer")
+    for folder in ("examples", "examples/flight_computer", "examples/learning")
     for path in files(folder)
     if path.suffix in (".c", ".md", ".py", ".urdf") or path.name == "Makefile"
 ]

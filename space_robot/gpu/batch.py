@@ -26,7 +26,7 @@ from ..flight.flown_log import empty_log, ended_early, note_assumed_errors
 from ..flight.plan import Flight
 from ..flight.simulate import measured_ticks
 from .device import Device
-from .log_columns import OF_SIGNALS, columns_of, targets
+from .log_columns import OF_SIGNALS, columns_of, parts_of
 from .structs import packed, unpack
 from .translation import Parts, Translation, loop_calls, sizes_of
 
@@ -320,7 +320,7 @@ class DeviceBatch:
             return
         numbers = np.ascontiguousarray(self._log.read(stop - start).transpose(2, 0, 1))
         for log, rows in zip(self.logs, numbers, strict=True):
-            for column, place in targets(self._columns, log):
+            for column, place in parts_of(self._columns, log):
                 column[start:stop] = rows[:, place]
 
     def _flown(self, k: int) -> FlownInBatch:

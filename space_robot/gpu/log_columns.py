@@ -61,7 +61,7 @@ def columns_of(log: FlightLog) -> list[LogColumn]:
     return columns
 
 
-def targets(columns: list[LogColumn], log: FlightLog) -> Iterator[tuple[Array, slice]]:
+def parts_of(columns: list[LogColumn], log: FlightLog) -> Iterator[tuple[Array, slice]]:
     """Yield the arrays (N, c) of a log, and the places of their numbers in a row."""
     for column in columns:
         kind, _, name = column.name.partition(".")

@@ -88,6 +88,7 @@ NOT_RUN = {
     r"python docs/flown": "its tables: tests/test_flown_pages.py",
     r"make\b|BAG_FUZZ_EXAMPLES": "runs these tests, or for long",
     r"nft\b": "the machine's firewall",
+    r".*--device gpu|python tools/gpu_check.py": "a GPU: tests/laboratory/gpu",
     r"dask\b|.*--scheduler": "a cluster: tests/laboratory/processes/test_pool.py has one",
     r"python docs/law_league.py": "eleven laws, for some hours",
     r"python docs/ets_vii_tables.py": "450 flights: test_ets_vii.py flies some of them",
