@@ -93,10 +93,10 @@ class Translation:
             }
             self.roots = {name: self.program.functions[k] for name, k in numbers.items()}
             reached = reachable(self.program, self.roots.values())
-            more = {field for function in reached for field in function.stores} - self._written
-            if not more:
+            written = {field for function in reached for field in function.stores}
+            self._written |= written
+            if not written & self.constants.keys():
                 break
-            self._written |= more
         whole = [State, Reference, *(r for r in self._records if r not in OF_THE_LOOP)]
         self.files = Files(self.program, list(self.roots.values()), whole, lambda module: "loop")
         self.files.fields |= set(kept)

@@ -13,7 +13,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
-from types import FunctionType
+from types import CellType, FunctionType
 from typing import Any, NamedTuple
 
 from space_robot_msgs_py.compiled.records import Field as RecordField
@@ -227,13 +227,16 @@ class KernelProgram:
         self.records[id(record)] = record
         declared = record.fields()[name]
         assert isinstance(declared, RecordField)
-        # a shape is a lambda that reads capacities of its module: here it reads the export's
-        shape: Any = declared.shape
-        resized = FunctionType(
-            shape.__code__, {**shape.__globals__, **self.sizes}, None, None, shape.__closure__
-        )
-        numbers: tuple[int, ...] = tuple(resized(self.joints))
+        numbers: tuple[int, ...] = tuple(self._resized(declared.shape)(self.joints))
         return numbers
+
+    def _resized(self, shape: Any) -> Any:
+        """Return a function that reads the export's capacities in place of its module's."""
+        cells = [cell.cell_contents for cell in shape.__closure__ or ()]
+        inner = (self._resized(c) if isinstance(c, FunctionType) else c for c in cells)
+        closure = tuple(map(CellType, inner)) or None
+        sizes = {**shape.__globals__, **self.sizes}
+        return FunctionType(shape.__code__, sizes, None, None, closure)
 
     def named(self, module: str, name: str, number: float) -> str:
         """Return the text of a module's constant."""
