@@ -32,8 +32,8 @@ from .translation import Parts, Translation, loop_calls, sizes_of
 
 LOG_BYTES = 1 << 30
 """Of the part of all logs that is on the device at a time."""
-REHEARSED = 32
-"""Flights whose events are rehearsed."""
+REHEARSED, MOST_EVENTS = 32, 40
+"""Flights whose events are rehearsed, and how many of each."""
 MOST_STRETCH = 4000
 """Ticks between two reports of progress."""
 
@@ -198,7 +198,9 @@ class DeviceBatch:
         after: list[NDArray[Any]] = []
         for flight in eventful:
             plant = copy.deepcopy(flight.plant)
-            while plant.next_change < flight.ticks:
+            for _ in range(MOST_EVENTS):
+                if plant.next_change >= flight.ticks:
+                    break
                 plant.change(int(plant.next_change))
                 after.append(plant.block.copy())
         self._events = np.concatenate([*after, self._plants[:1]])
