@@ -6,6 +6,8 @@ from collections.abc import Callable, Hashable, Iterable, Iterator, Sequence
 from functools import cache
 from typing import Any, NamedTuple
 
+from numpy.typing import NDArray
+
 from space_robot_control.controller.controller import unusable
 from space_robot_control.controller.law_choice import LawChoice
 from space_robot_control.controller.signals import USABLE, ControllerMemory
@@ -135,6 +137,51 @@ def fly_group(flights: Sequence[Flight], is_brief: bool = False) -> list[FlownIn
     return [FlownInBatch(0, log, ending)]
 
 
+def choose_laws(
+    flights: Sequence[Flight],
+    choices: Sequence[LawChoice],
+    logs: Sequence[FlightLog],
+    flies: NDArray[Any],
+    tick: int,
+) -> bool:
+    """Let the laws chosen for a tick take over; return whether any has.
+
+    The change is noted in the logs of flights that go on, for which ``flies`` (F,) is not 0.
+    """
+    is_swapped = False
+    for k, (flight, choice) in enumerate(zip(flights, choices, strict=True)):
+        change = choice.change_at(tick)
+        if change and flies[k]:
+            logs[k].laws += (change.law,)
+        is_swapped |= flight.controller.use(choice.chosen)
+    return is_swapped
+
+
+def flown_whole(number: int, flight: Flight, log: FlightLog) -> FlownInBatch:
+    """Return a flight that was flown to its end."""
+    note_assumed_errors(flight, log, 0, log.ticks)
+    return FlownInBatch(number, log, Ending.complete(flight.ticks, flight.period))
+
+
+def flown_in_part(
+    number: int, flight: Flight, log: FlightLog, status: int, fastest: float
+) -> FlownInBatch:
+    """Return a flight that ended early, whose plant has the state and tick that it reached.
+
+    ``status`` is that of its last state, ``fastest`` its `fastest_rate`, rad/s.
+    """
+    plant = flight.plant
+    reached = plant.tick
+    error: FlightError = (
+        plant.diverged(fastest)
+        if status == USABLE
+        else unusable(status, reached, plant.state.quaternion)
+    )
+    note_assumed_errors(flight, log, 0, reached)
+    log = ended_early(log, measured_ticks(plant, error), reached)
+    return FlownInBatch(number, log, Ending.early(error, flight.period))
+
+
 class FlightBatch:
     """Flights that fly together, see `batch_key`; plants and controllers are flown on."""
 
@@ -166,24 +213,12 @@ class FlightBatch:
         return flown
 
     def _flown(self, k: int, log: FlightLog) -> FlownInBatch:
-        flight = self.flights[k]
-        if self._memory.flies[0, k]:
-            note_assumed_errors(flight, log, 0, log.ticks)
-            return FlownInBatch(k, log, Ending.complete(flight.ticks, flight.period))
-        reached = int(self._memory.tick[0, k])
-        note_assumed_errors(flight, log, 0, reached)
-        error = self._error(k, reached)
-        log = ended_early(log, measured_ticks(flight.plant, error), reached)
-        return FlownInBatch(k, log, Ending.early(error, flight.period))
-
-    def _error(self, k: int, reached: int) -> FlightError:
-        plant, memory = self.flights[k].plant, self._memory
-        plant.state.tick = plant.truth.tick = reached
+        flight, memory = self.flights[k], self._memory
+        if memory.flies[0, k]:
+            return flown_whole(k, flight, log)
+        flight.plant.state.tick = flight.plant.truth.tick = int(memory.tick[0, k])
         copy_command(memory, self.flights, k)
-        status = int(memory.status[0, k])
-        if status != USABLE:
-            return unusable(status, reached, plant.state.quaternion)
-        return plant.diverged(float(memory.fastest[0, k]))
+        return flown_in_part(k, flight, log, int(memory.status[0, k]), float(memory.fastest[0, k]))
 
     def _fly(self, logs: LogsInLanes, progress: Callable[[int], None]) -> None:
         for start, stop in self.flights[0].stretches(STRETCH_TICKS):
@@ -214,13 +249,7 @@ class FlightBatch:
         measure_lanes(memory.plants.block, end, first.period)
 
     def _choose_laws(self, logs: LogsInLanes, tick: int) -> None:
-        is_swapped = False
-        for k, (flight, choice) in enumerate(zip(self.flights, self._choices, strict=True)):
-            change = choice.change_at(tick)
-            if change and self._memory.flies[0, k]:
-                logs.logs[k].laws += (change.law,)
-            is_swapped |= flight.controller.use(choice.chosen)
-        if not is_swapped:
+        if not choose_laws(self.flights, self._choices, logs.logs, self._memory.flies[0], tick):
             return
         laws = [flight.controller.law for flight in self.flights]
         self._law = LawInLanes(laws, self.flights[0].robot.n)

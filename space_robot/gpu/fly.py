@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import click
 
@@ -36,10 +36,7 @@ def device_named(name: str) -> Device | None:
 
 
 def fly_on_device(
-    flights: Sequence[Flight],
-    device: Device,
-    is_brief: bool = False,
-    progress: Callable[[int], object] = lambda flown: None,
+    flights: Sequence[Flight], device: Device, is_brief: bool = False
 ) -> list[FlownInBatch]:
     """Fly flights of one `batch_key` on a device; return them as they ended, in their order.
 
@@ -49,7 +46,6 @@ def fly_on_device(
         flights: checked.
         device: where they fly.
         is_brief: see `empty_log`.
-        progress: called with the number of flights that are over.
 
     Raises:
         InputError: a kernel has no translation.
@@ -71,5 +67,4 @@ def fly_on_device(
             click.echo(f"device gpu: little memory is free: {size} flights at a time", err=True)
             continue
         flown += [one._replace(flight=len(flown) + one.flight) for one in batch.fly()]
-        progress(len(flown))
     return flown

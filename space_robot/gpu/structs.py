@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+from space_robot_control.flight_code.software import numbers_of
 
 Structs = NDArray[Any]
 """An array (F,) of structs of doubles."""
@@ -18,7 +21,7 @@ def pack(blocks: Structs, structs: Structs) -> None:
         if target.dtype.names:
             pack(blocks[name], target)
         else:
-            target[...] = blocks[name][_part(target)]
+            target[...] = numbers_of(target.shape, blocks[name])
 
 
 def unpack(structs: Structs, blocks: Structs) -> None:
@@ -28,7 +31,7 @@ def unpack(structs: Structs, blocks: Structs) -> None:
         if source.dtype.names:
             unpack(source, blocks[name])
         else:
-            blocks[name][_part(source)] = source
+            numbers_of(source.shape, blocks[name])[...] = source
 
 
 def packed(blocks: Structs, dtype: np.dtype[Any]) -> Structs:
@@ -38,5 +41,11 @@ def packed(blocks: Structs, dtype: np.dtype[Any]) -> Structs:
     return structs
 
 
-def _part(array: NDArray[Any]) -> tuple[slice, ...]:
-    return tuple(slice(0, size) for size in array.shape)
+def argument_struct(numbers: Mapping[str, float], pointers: Mapping[str, int]) -> Structs:
+    """Return a program's argument (1,): numbers, integers as such, then addresses of arrays."""
+    fields: list[tuple[str, Any]] = [
+        (name, np.int64 if isinstance(number, int) else np.float64)
+        for name, number in numbers.items()
+    ]
+    fields += [(name, np.uint64) for name in pointers]
+    return np.array([(*numbers.values(), *pointers.values())], fields)

@@ -5,8 +5,6 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from gymnasium.vector import AutoresetMode, VectorEnv
-from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
 from space_robot_control.flight_code.c99 import language as lang
@@ -17,10 +15,10 @@ from space_robot_msgs_py.errors import InputError
 from space_robot_sim.plant.tick import PlantMemory
 
 from ..gpu.device import Device, Memory
-from ..gpu.structs import packed
+from ..gpu.structs import argument_struct, packed
 from ..gpu.translation import Call, Translation, sizes_of
 from .reach import Reach, begin_episode, draw_episode, step_alone
-from .reach_env import Info, spaces, task_with
+from .reach_env import Info, ReachEnvs
 
 MOST_ENVS = 1 << 24
 LAST_SEED = (1 << 32) - 1
@@ -28,7 +26,7 @@ GENERATOR = lang.TupleOf((lang.UINT,) * 4)
 """State of a generator of random numbers."""
 
 
-class ReachDeviceEnv(VectorEnv[Memory, Any, Memory]):
+class ReachDeviceEnv(ReachEnvs):
     """Many `ReachEnv` on a device, one a thread; each has the bits of its own.
 
     Observations, rewards and flags are arrays on the device, which the next step overwrites;
@@ -44,12 +42,8 @@ class ReachDeviceEnv(VectorEnv[Memory, Any, Memory]):
             device: where they are.
             settings: of `ReachTask`.
         """
-        self.num_envs = as_whole_number(num_envs, "num_envs", 1, MOST_ENVS)
-        self.task = task = task_with(settings)
-        self.single_observation_space, self.single_action_space = spaces(task)
-        self.observation_space = batch_space(self.single_observation_space, self.num_envs)
-        self.action_space = batch_space(self.single_action_space, self.num_envs)
-        self.metadata = {"autoreset_mode": AutoresetMode.NEXT_STEP}
+        super().__init__(num_envs, MOST_ENVS, settings)
+        task = self.task
         self._device, count, axes = device, self.num_envs, task.n + 3
         reach = Reach.block(task.n)
         task.describe(reach)
@@ -117,20 +111,18 @@ class ReachDeviceEnv(VectorEnv[Memory, Any, Memory]):
 
     def _run(self, function: str, seed: int = 0, actions: int | None = None) -> None:
         task = self.task
-        numbers: list[tuple[str, Any, Any]] = [
-            ("count", np.int64, self.num_envs),
-            ("ticks", np.int64, task.ticks_per_step),
-            ("seed", np.int64, seed),
-            ("period", np.float64, task.period),
-            ("spread", np.float64, task.start_spread),
-            ("distance", np.float64, task.reach),
-        ]
+        numbers = {
+            "count": self.num_envs,
+            "ticks": task.ticks_per_step,
+            "seed": seed,
+            "period": task.period,
+            "spread": task.start_spread,
+            "distance": task.reach,
+        }
         pointers = {name: array.pointer for name, array in self._arrays.items()}
         pointers["actions"] = actions or pointers["actions"]
-        numbers += [(name, np.uint64, pointer) for name, pointer in pointers.items()]
-        dtype = np.dtype([(name, kind) for name, kind, _ in numbers])
-        values = np.array([tuple(value for _, _, value in numbers)], dtype)
-        self._program.run(function, self.num_envs, self._device.store(values))
+        argument = self._device.store(argument_struct(numbers, pointers))
+        self._program.run(function, self.num_envs, argument)
 
 
 def _described(actions: Any) -> tuple[tuple[int, ...], str]:

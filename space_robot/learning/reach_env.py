@@ -137,8 +137,7 @@ class ReachTask:
         reach["scale"], reach["ticks"], reach["boresight"] = self.scale, self.ticks, self.boresight
 
 
-def task_with(settings: Mapping[str, Any]) -> ReachTask:
-    """Return the task with settings by name."""
+def _task(settings: Mapping[str, Any]) -> ReachTask:
     for name in settings:
         one_of(name, signature(ReachTask).parameters, "setting", " of the task reach")
     return ReachTask(**settings)
@@ -187,8 +186,8 @@ class ReachEnv(gymnasium.Env[Array, Array]):
 
     def __init__(self, **settings: Any) -> None:
         """Create an environment; ``settings`` are those of `ReachTask`."""
-        self.task = task_with(settings)
-        self.observation_space, self.action_space = spaces(self.task)
+        self.task = _task(settings)
+        self.observation_space, self.action_space = _spaces(self.task)
         self._plant, self._reach = self.task.begin.block.copy(), Reach.block(self.task.n)
 
     def reset(
@@ -212,7 +211,20 @@ class ReachEnv(gymnasium.Env[Array, Array]):
         return reach["observation"][0].copy(), float(reach["reward"][0]), failed, truncated, {}
 
 
-class ReachVectorEnv(VectorEnv[Array, Array, Array]):
+class ReachEnvs(VectorEnv[Any, Any, Any]):
+    """Many `ReachEnv` stepped together: what those here and those on a device have in common."""
+
+    def __init__(self, num_envs: int, most: int, settings: Mapping[str, Any]) -> None:
+        """Check number, at most ``most``, and settings, and describe the spaces."""
+        self.num_envs = as_whole_number(num_envs, "num_envs", 1, most)
+        self.task = _task(settings)
+        self.single_observation_space, self.single_action_space = _spaces(self.task)
+        self.observation_space = batch_space(self.single_observation_space, self.num_envs)
+        self.action_space = batch_space(self.single_action_space, self.num_envs)
+        self.metadata = {"autoreset_mode": AutoresetMode.NEXT_STEP}
+
+
+class ReachVectorEnv(ReachEnvs):
     """Many `ReachEnv` stepped together, eight in the lanes of a vector; each with its own bits.
 
     An environment whose episode is over begins the next one at the following step, which ignores
@@ -227,12 +239,8 @@ class ReachVectorEnv(VectorEnv[Array, Array, Array]):
             threads: among which they are divided; the bits do not depend on it.
             settings: of `ReachTask`.
         """
-        self.num_envs = as_whole_number(num_envs, "num_envs", 1, MOST_ENVS)
-        self.task = task = task_with(settings)
-        self.single_observation_space, self.single_action_space = spaces(task)
-        self.observation_space = batch_space(self.single_observation_space, self.num_envs)
-        self.action_space = batch_space(self.single_action_space, self.num_envs)
-        self.metadata = {"autoreset_mode": AutoresetMode.NEXT_STEP}
+        super().__init__(num_envs, MOST_ENVS, settings)
+        task = self.task
         groups = -(-self.num_envs // WIDTH)
         self._states = np.zeros((groups, task.state_size, WIDTH))
         self._reaches: Block = np.zeros(groups, Reach.dtype(task.n, WIDTH))
@@ -340,8 +348,7 @@ class ReachVectorEnv(VectorEnv[Array, Array, Array]):
             self._observations[k] = reach["observation"][0]
 
 
-def spaces(task: ReachTask) -> tuple[Any, Any]:
-    """Return the spaces of an observation and of an action."""
+def _spaces(task: ReachTask) -> tuple[Any, Any]:
     m = task.n + 3
     high = np.full(2 * m, LARGEST)
     high[:3] = 2.0
