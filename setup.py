@@ -103,6 +103,13 @@ setup(
             "ziamath",
         ],
         "gpu": ["cuda-bindings>=13", "nvidia-cuda-nvrtc>=13"],  # flights on NVIDIA devices
+        # telemetry and telecommands; aiohttp serves the display
+        "ground": [
+            "aiohttp>=3.9",
+            "space-packet-parser>=6",
+            "spacepackets>=0.32",
+            "yamcs-pymdb>=1.3",
+        ],
         "gym": ["gymnasium>=1.0"],  # space_robot.api.gymnasium_env
         "mpc": ["daqp>=0.8"],  # examples/mpc_law.py
         "mutation": ["cosmic-ray"],  # tools/mutation

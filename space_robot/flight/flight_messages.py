@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from space_robot_control.controller.law_choice import LawChoice
 from space_robot_control.controller.reference_buffer import ReferenceBuffer
-from space_robot_control.controller.supervisor import StateResponder, Supervisor
+from space_robot_control.controller.supervisor import Report, StateResponder, Supervisor
 from space_robot_control.controller.tick import NEW
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.bag.flight_log import FlightLog
@@ -210,10 +210,12 @@ class MessageLoop:
         record: Record,
         update_true_state: Callable[[RobotState], None],
         supervisor: Supervisor | None = None,
+        report: Report | None = None,
     ) -> None:
         """Begin at the flight's first tick.
 
-        ``update_true_state`` gets each true state that is not the measured one.
+        ``update_true_state`` gets each true state that is not the measured one; ``report``: see
+        `StateResponder`.
         """
         robot, settings = flight.robot, flight.plant_settings
         names = flight.plant.names
@@ -229,6 +231,7 @@ class MessageLoop:
             LawChoice(flight.law, flight.swaps),
             self._references,
             flight.controller_settings,
+            report=report,
         )
         self._state = RobotState.allocate(robot.n)
         self._streamed = 0

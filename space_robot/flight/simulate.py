@@ -26,6 +26,7 @@ from ..processes.scratch_folder import ScratchFolder
 from .flight_messages import MessageLoop, Messages, recording
 from .flown_log import ended_early, flight_log, note_assumed_errors
 from .plan import Flight
+from .telemetry import live_telemetry, telemetry_of
 
 Array = NDArray[np.float64]
 
@@ -60,9 +61,9 @@ def simulate(
         return _flown_by_messages(flight, bag, progress)
     log = flight_log(flight, description=None if is_kept else flight.brief)
     choice = LawChoice(flight.law, flight.swaps)
-    with recording(flight, bag) as messages:
+    with recording(flight, bag) as messages, telemetry_of(flight) as send:
         try:
-            _fly(flight, log, choice, messages, progress)
+            _fly(flight, log, choice, messages, send, progress)
         except FlightError as error:
             error.log = ended_early(log, measured_ticks(flight.plant, error), flight.plant.tick)
             raise
@@ -76,9 +77,10 @@ def _flown_by_messages(
     with ScratchFolder() as folder:
         path = bag or Path(folder) / "bag"
         try:
-            with recording(flight, path) as messages:
+            with recording(flight, path) as messages, live_telemetry(flight) as report:
                 assert messages
-                loop = MessageLoop(flight, messages.record, messages.update_true_state)
+                update_truth = messages.update_true_state
+                loop = MessageLoop(flight, messages.record, update_truth, report=report)
                 for tick in range(flight.plant.tick, flight.ticks):
                     if tick % MESSAGE_STRETCH == 0:
                         progress(tick)
@@ -103,6 +105,7 @@ def _fly(
     log: FlightLog,
     choice: LawChoice,
     messages: Messages | None,
+    send: Callable[[FlightLog], None],
     progress: Callable[[int], None],
 ) -> None:
     plant, controller = flight.plant, flight.controller
@@ -117,10 +120,12 @@ def _fly(
             note_assumed_errors(flight, log, start, plant.tick)
             if messages:
                 messages.stretch(log, start, measured_ticks(plant, error), plant.tick)
+            send(log.rows(start, plant.tick))
             raise
         note_assumed_errors(flight, log, start, stop)
         if messages:
             messages.stretch(log, start, stop, stop)
+        send(log.rows(start, stop))
 
 
 def close_loop(plant: Plant, controller: Controller, log: FlightLog, start: int, stop: int) -> None:

@@ -183,6 +183,21 @@ class Options:
         node="controller",
         sets="controller",
     )
+    telemetry: str = option(
+        "Send telemetry as CCSDS packets to udp:HOST:PORT, or write them to a file",
+        "",
+        default_text="none",
+        metavar="DESTINATION",
+        node="controller",
+        sets="controller",
+    )
+    telemetry_packets: str = option(
+        "Packets of the telemetry: {names}, or a path to a YAML file",
+        "housekeeping",
+        folder="telemetry",
+        node="controller",
+        sets="controller",
+    )
     realtime: bool = option("Pace by the wall clock instead of lockstep", False, needs_graph=True)
     paused: bool = option(
         "Begin paused: `space-robot sim` resumes the plant, or steps it",

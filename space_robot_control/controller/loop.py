@@ -28,6 +28,7 @@ from .controller import Controller
 from .gains import NOMINAL_H_BAR, Laws, check_gains, gain_lengths, gain_range, split_gains
 from .inputs import ReferenceInput, StateInput
 from .law_choice import LawChoice, parse_swaps
+from .live_telemetry import LiveTelemetry
 from .settings import ControllerNodeSettings
 from .supervisor import StateResponder, Supervisor
 from .tick import ANSWERED, MODES, NOMINAL, REFUSED, SAFE
@@ -74,12 +75,15 @@ class ControllerLoop:
         self._references = ReferenceInput(
             node, robot, timebase, settings.reference_timeout, settings.join_timeout
         )
+        laws = [law.name for law in self._laws.laws]
+        self._telemetry = LiveTelemetry.from_settings(settings, self._controller.names, laws)
         self._answering = StateResponder(
             make_supervisor(self._controller, self._laws.laws, settings),
             self._laws.choice,
             self._references.buffer,
             settings,
             node.get_fully_qualified_name(),
+            self._telemetry.report if self._telemetry else None,
         )
         self._command_out = RawPublisher(node, topics.COMMAND)
         self._out = {
@@ -160,8 +164,10 @@ class ControllerLoop:
         flush(self.outputs, FLUSH_S)
 
     def close(self) -> None:
-        """Stop reacting to parameters."""
+        """Stop reacting to parameters, and close the telemetry."""
         self._laws.close()
+        if self._telemetry:
+            self._telemetry.close()
 
     def health(self) -> Health:
         """Report the mode, the law, and rejected messages."""

@@ -143,6 +143,13 @@ class ControllerNodeSettings(NodeSettings):
         20,
         description="ticks between two messages on /controller/telemetry and /controller/signals",
     )
+    telemetry: str = Field(
+        "", description="where telemetry packets go: udp:HOST:PORT or a file (empty: nowhere)"
+    )
+    telemetry_packets: str = Field(
+        "housekeeping",
+        description="what they have: a name of config/telemetry, or a path to a YAML file",
+    )
     swaps: Texts = Field(
         [""], description="changes of the law in flight, each as T:LAW with T in simulated seconds"
     )

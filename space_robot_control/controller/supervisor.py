@@ -12,7 +12,7 @@ applied force (`Controller.engage`). All of it happens in the kernels of `tick`.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.bag.law_history import LawChange
 from space_robot_msgs_py.compiled.records import Block, assign
-from space_robot_msgs_py.samples import Command, RobotState
+from space_robot_msgs_py.samples import Command, LawInForce, RobotState
 from space_robot_msgs_py.wire.codecs import CommandCodec
 from space_robot_msgs_py.wire.telemetry import NODE, LawCodec, SignalsCodec, TelemetryCodec
 
@@ -159,6 +159,10 @@ class Supervisor:
         return self._command
 
 
+Report = Callable[[RobotState, Block, Supervisor, Array, LawInForce | None], None]
+"""Receiver of a state, its reference, what answered, the answer, and the law if it changed."""
+
+
 class StateResponder:
     """Answers each state once with the messages of the controller. Independent of ROS."""
 
@@ -169,10 +173,12 @@ class StateResponder:
         references: ReferenceBuffer,
         settings: ControllerNodeSettings,
         node: str = NODE,
+        report: Report | None = None,
     ) -> None:
         """Answer with ``supervisor`` under the laws chosen, as the node's settings say.
 
-        ``references`` receive the current tick; ``node`` is the node's full name.
+        ``references`` receive the current tick; ``node`` is the node's full name; ``report`` gets
+        what a tick's answer was computed from.
         """
         self.supervisor, self._laws, self._references = supervisor, laws, references
         names = supervisor.controller.names
@@ -181,6 +187,7 @@ class StateResponder:
         self._signals = SignalsCodec(names.axes, settings.timebase)
         self._law = LawCodec(settings.timebase, node)
         self._telemetry_decimation = settings.telemetry_decimation
+        self._report = report
         self.answer = b""
         """The last command, as it was sent."""
         self.change: LawChange | None = None
@@ -214,8 +221,12 @@ class StateResponder:
             yield topics.LAW, self._law.encode(self.change.law)
             self.supervisor.use(laws.chosen)
         state.tick = tick
-        self.answer = self.encode(self.supervisor.answer(state, reference))
+        command = self.supervisor.answer(state, reference)
+        self.answer = self.encode(command)
         yield topics.COMMAND, self.answer
+        if self._report:
+            law = self.change.law if self.change else None
+            self._report(state, reference, self.supervisor, command.torque, law)
         if tick % self._telemetry_decimation == 0:
             s, u, n_hat, e = self.supervisor.telemetry()
             yield topics.TELEMETRY, self._telemetry.encode(tick, (s, u, n_hat, e))

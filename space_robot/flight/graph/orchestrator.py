@@ -28,6 +28,7 @@ from ...processes.scratch_folder import ScratchFolder
 from ..compilation import compile_kernels
 from ..flight_messages import bag_remark, check_bag_path
 from ..plan import Flight
+from ..telemetry import prepare_telemetry, telemetry_remark
 from . import composed
 from .composed import NAME
 from .domain import is_quiet, ros_domain
@@ -69,6 +70,8 @@ def fly(
     check_bag_path(bag)
     require_ros()
     compile_kernels(bool(flight.plant.names.actuators))
+    if database := prepare_telemetry(flight):
+        remarks = [*remarks, telemetry_remark(flight, database)]
     options = flight.scenario.options
     namespace, own = options.namespace, [f"{node}_node" for node in options.without]
     with ros_domain(options.domain, namespace, own) as domain, stop_signals() as stopped:
