@@ -198,6 +198,14 @@ class Options:
         node="controller",
         sets="controller",
     )
+    telecommands: str = option(
+        "Take telecommands, CCSDS packets, at udp:127.0.0.1:PORT",
+        "",
+        default_text="none",
+        metavar="ADDRESS",
+        needs_graph=True,
+        is_launched=False,
+    )
     realtime: bool = option("Pace by the wall clock instead of lockstep", False, needs_graph=True)
     paused: bool = option(
         "Begin paused: `space-robot sim` resumes the plant, or steps it",

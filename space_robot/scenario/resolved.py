@@ -268,7 +268,7 @@ SHOWN_IF_SET: Mapping[str, Callable[[ResolvedScenario], Any]] = {
 HIDDEN = {
     *("friction", "compression", "split_size"),  # in the case, and in the recorder's parameters
     *("namespace", "composed", "domain", "join_timeout"),  # where, and not what, is flown
-    *("telemetry", "telemetry_packets"),
+    *("telemetry", "telemetry_packets", "telecommands"),
 }
 HELD = {
     *(OPTIONS.keys() - HIDDEN),

@@ -45,6 +45,7 @@ from .processes import (
     ros_arguments,
     write_parameters,
 )
+from .telecommand_link import TelecommandLink
 
 Parameters = Mapping[str, Mapping[str, Any]]
 COMPOSED_DRAIN_S = 0.002
@@ -74,7 +75,11 @@ def fly(
         remarks = [*remarks, telemetry_remark(flight, database)]
     options = flight.scenario.options
     namespace, own = options.namespace, [f"{node}_node" for node in options.without]
-    with ros_domain(options.domain, namespace, own) as domain, stop_signals() as stopped:
+    with (
+        _telecommands(flight) as link,
+        ros_domain(options.domain, namespace, own) as domain,
+        stop_signals() as stopped,
+    ):
         is_empty = is_quiet(domain)
         _claim(bag)
         begin = time.monotonic()
@@ -91,6 +96,8 @@ def fly(
                     parameters["plant"]["wait_for"].append(clock)
                 commands = _commands(flight, parameters, folder)
                 with Graph(commands, node_environment(domain)) as graph:
+                    if link:
+                        link.begin(domain, namespace)
                     what_happened = follow(
                         graph, flight, parameters, domain, folder, stopped, is_empty
                     )
@@ -103,10 +110,23 @@ def fly(
         _say(f"flown and recorded in {time.monotonic() - begin:.1f} s, start-up included")
     report = analyze(read_flight(bag, trust=True))
     report["graph"] = what_happened
+    if link:
+        report["graph"]["telecommands"] = {**link.counts, "refusals": link.refusals}
+        for line in link.lines():
+            _say(line)
     for warning in what_happened["warnings"]:
         _say(f"warning: {warning}")
     _check(report, flight)
     return report
+
+
+@contextmanager
+def _telecommands(flight: Flight) -> Iterator[TelecommandLink | None]:
+    if address := flight.scenario.options.telecommands:
+        with TelecommandLink(address, flight) as link:
+            yield link
+    else:
+        yield None
 
 
 def _commands(
