@@ -58,6 +58,7 @@ setup(
         "space_robot.choice": ["templates/*.j2"],
         "space_robot.cli": ["templates/*.txt"],
         "space_robot.gpu": ["templates/*.j2"],
+        "space_robot.ground": ["templates/*"],
         "space_robot.help": ["*.md"],
         "space_robot.paper": ["templates/*.j2"],
         "space_robot.view": ["templates/*"],

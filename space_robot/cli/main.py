@@ -35,7 +35,7 @@ SECTIONS = {
     "Robots, missions and own pieces": ("new", "plan", "robot", "urdf"),
     "Results": ("analyze", "diff", "replay", "view"),
     "Gains and studies": ("campaign", "choose", "gains", "reproduce", "stability"),
-    "Flight code and ground": ("export", "telemetry"),
+    "Flight code and ground": ("export", "ground", "telemetry"),
 }
 """Headings of the help, and the commands below each."""
 SHARED_MODULES = {

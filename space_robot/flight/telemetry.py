@@ -39,7 +39,7 @@ class TelemetryPlan(NamedTuple):
     structures: Structures
     laws: tuple[str, ...]
     timeline: list[tuple[float, str]]
-    """Planned captures, faults and swaps: time, s, and text."""
+    """Planned captures and faults: time, s, and text."""
 
     @classmethod
     def of_flight(cls, flight: Flight) -> TelemetryPlan:
@@ -47,9 +47,9 @@ class TelemetryPlan(NamedTuple):
         scenario, settings = flight.scenario, flight.controller_settings
         names = flight.controller.names
         structures = telemetry_structures(settings.telemetry_packets, names, flight.timebase)
-        texts = scenario.faults, scenario.plant.events, scenario.swap_texts
+        texts = *scenario.faults, *scenario.plant.events
         robot, actuators = scenario.robots.controller, scenario.assumed_actuators
-        return cls(robot, actuators, structures, tuple(flight.laws), _timeline(*texts))
+        return cls(robot, actuators, structures, tuple(flight.laws), _timeline(texts))
 
     @classmethod
     def of_log(cls, log: FlightLog, packets: str) -> TelemetryPlan:
@@ -67,8 +67,8 @@ class TelemetryPlan(NamedTuple):
         structures = telemetry_structures(packets, actuators.robot_names(robot), timebase)
         scenario = flown.get("scenario", {})
         laws = {*(law.name for law in log.laws), *scenario.get("gains", {}), flown["controller"]}
-        texts = (flown.get(key, ()) for key in ("faults", "events", "swaps"))
-        return cls(robot, actuators, structures, tuple(laws), _timeline(*texts))
+        texts = *flown.get("faults", ()), *flown.get("events", ())
+        return cls(robot, actuators, structures, tuple(laws), _timeline(texts))
 
     @property
     def database(self) -> str:
@@ -192,12 +192,6 @@ def signal_limits(
     return limits
 
 
-def _timeline(
-    faults: Sequence[str], events: Sequence[str], swaps: Sequence[str]
-) -> list[tuple[float, str]]:
-    texts = [match for text in (*faults, *events) if (match := EVENT.match(str(text)))]
-    timeline = [(float(match[2]), match[1].replace("_", " ")) for match in texts]
-    for text in swaps:
-        time, _, law = str(text).partition(":")
-        timeline.append((float(time), f"swap to {law}"))
-    return sorted(timeline)
+def _timeline(texts: Sequence[str]) -> list[tuple[float, str]]:
+    matches = filter(None, (EVENT.match(str(text)) for text in texts))
+    return sorted((float(match[2]), match[1].replace("_", " ")) for match in matches)

@@ -1,0 +1,127 @@
+"""The command ``space-robot ground``: telemetry on a page of NASA's Open MCT."""
+
+from __future__ import annotations
+
+import webbrowser
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from .options import excerpt_options
+
+if TYPE_CHECKING:
+    from space_robot_msgs_py.bag.flight_log import FlightLog
+
+    from ..ground.server import GroundServer
+
+
+@click.command()
+@click.argument("bag", required=False, type=click.Path(path_type=Path))
+@click.option(
+    "--udp",
+    type=click.IntRange(1, 65535),
+    default=10015,
+    show_default=True,
+    help="Port at which telemetry is received.",
+)
+@click.option(
+    "--database",
+    type=click.Path(path_type=Path, dir_okay=False),
+    help="XTCE file of the telemetry [default: that of the flight that sends to the port].",
+)
+@click.option(
+    "--packets",
+    default="housekeeping",
+    show_default=True,
+    metavar="NAME-or-FILE",
+    help="Packets of a BAG: a name of config/telemetry, or a path to a YAML file.",
+)
+@click.option(
+    "--port",
+    type=click.IntRange(0, 65535),
+    default=8090,
+    show_default=True,
+    help="Of the page, on 127.0.0.1; 0: a free one.",
+)
+@click.option("--open/--no-open", "opens", default=True, help="Open the page in a browser.")
+@excerpt_options
+def ground(
+    bag: Path | None,
+    udp: int,
+    database: Path | None,
+    packets: str,
+    port: int,
+    opens: bool,
+    read: Callable[[Path], FlightLog],
+) -> None:
+    """Show telemetry of a flight in NASA's Open MCT: curves, limits, events.
+
+    Without a BAG it shows what flies: start it, then a flight with --telemetry. The numbers come
+    out of the packets, by their XTCE database alone, as at a ground station.
+
+    \b
+    Examples:
+      space-robot ground
+      space-robot fly --telemetry udp:127.0.0.1:10015 --realtime
+      space-robot ground flights/one
+      space-robot ground flights/one --packets fast --from 10 --to 20
+    """
+    import asyncio
+
+    from space_robot_msgs_py.errors import InputError
+
+    try:
+        from ..ground.server import GroundServer, find_openmct
+    except ImportError as error:
+        from space_robot_msgs_py.config.installation import install_command
+
+        raise InputError(f"ground needs {error.name}: `{install_command('ground')}`") from None
+    from ..flight.telemetry import database_path
+    from ..processes.interruption import Interrupted
+
+    server = GroundServer(find_openmct(), is_live=bag is None)
+    if bag:
+        _fill(server, read(bag), packets)
+    path = database or database_path(f"udp:127.0.0.1:{udp}")
+    try:
+        asyncio.run(_serve(server, port, udp, path, opens))
+    except Interrupted:
+        click.echo("ended", err=True)
+
+
+def _fill(server: GroundServer, log: FlightLog, packets: str) -> None:
+    """Give a server the packets of a log, as a receiver would have got them."""
+    from tempfile import TemporaryDirectory
+
+    from space_packet_parser.generators.ccsds import ccsds_generator
+
+    from space_robot_msgs_py.telemetry.downlink import Downlink, FileSink
+
+    from ..flight.telemetry import TelemetryPlan
+    from ..ground.decoder import Decoder
+
+    plan = TelemetryPlan.of_log(log, packets)
+    with TemporaryDirectory() as folder:
+        database, file = Path(folder) / "telemetry.xml", Path(folder) / "packets"
+        database.write_text(plan.database, "utf-8")
+        server.use(Decoder(database))
+        downlink = Downlink(plan.structures, FileSink(file))
+        plan.send(downlink, log)
+        downlink.close()
+        with file.open("rb") as stream:
+            for packet in ccsds_generator(stream):
+                server.receive(bytes(packet))
+
+
+async def _serve(server: GroundServer, port: int, udp: int, path: Path, opens: bool) -> None:
+    from ..ground.server import serve
+
+    events = serve(server, port, udp, path)
+    address = await anext(events)
+    click.echo(f"the display is at {address}; Ctrl-C ends", err=True)
+    if opens:
+        webbrowser.open(address)
+    async for text in events:
+        click.echo(text, err=True)
