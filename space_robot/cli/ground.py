@@ -97,7 +97,7 @@ def _fill(server: GroundServer, log: FlightLog, packets: str) -> None:
 
     from space_packet_parser.generators.ccsds import ccsds_generator
 
-    from space_robot_msgs_py.telemetry.downlink import Downlink, FileSink
+    from space_robot_msgs_py.telemetry.downlink import Downlink, open_sink
 
     from ..flight.telemetry import TelemetryPlan
     from ..ground.decoder import Decoder
@@ -107,7 +107,7 @@ def _fill(server: GroundServer, log: FlightLog, packets: str) -> None:
         database, file = Path(folder) / "telemetry.xml", Path(folder) / "packets"
         database.write_text(plan.database, "utf-8")
         server.use(Decoder(database))
-        downlink = Downlink(plan.structures, FileSink(file))
+        downlink = Downlink(plan.structures, open_sink(str(file)))
         plan.send(downlink, log)
         downlink.close()
         with file.open("rb") as stream:

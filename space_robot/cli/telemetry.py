@@ -74,9 +74,9 @@ def telemetry(
       space-robot simulate --telemetry live.packets
       space-robot telemetry --signals
     """
-    from space_robot_msgs_py.telemetry.downlink import Downlink, open_sink
+    from space_robot_msgs_py.telemetry.downlink import Downlink, FileSink, open_sink
 
-    from ..console.files import write_text
+    from ..console.files import atomic_file, write_text
     from ..console.terminal import echo_json
     from ..flight.telemetry import TelemetryPlan, database_path
 
@@ -84,11 +84,13 @@ def telemetry(
     log = read(bag)
     plan = TelemetryPlan.of_log(log, packets)
     database, path = plan.database, database_path(destination)
-    if not destination.startswith("udp:"):
-        write_text("", Path(destination), replace=True)
-    downlink = Downlink(plan.structures, open_sink(destination))
-    plan.send(downlink, log)
-    downlink.close()
+    if destination.startswith("udp:"):
+        downlink = Downlink(plan.structures, open_sink(destination))
+        plan.send(downlink, log)
+    else:
+        with atomic_file(Path(destination), replace=True) as file:
+            downlink = Downlink(plan.structures, FileSink(file))
+            plan.send(downlink, log)
     write_text(database, path, replace=True)
     report = {"packets": downlink.sent, "destination": destination, "database": str(path)}
     if as_json:

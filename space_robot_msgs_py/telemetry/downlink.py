@@ -9,7 +9,7 @@ from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from enum import IntEnum
 from pathlib import Path
-from typing import NamedTuple, Protocol
+from typing import IO, NamedTuple, Protocol
 
 import numpy as np
 
@@ -151,14 +151,11 @@ class UdpSink:
 
 
 class FileSink:
-    """A file of packets, one behind the other; what it has stays."""
+    """A file of packets, one behind the other."""
 
-    def __init__(self, path: Path) -> None:
-        """Raise an `InputError` if the file cannot be written."""
-        try:
-            self._file = path.open("ab")
-        except OSError as error:
-            raise InputError(f"{path}: {error.strerror}") from None
+    def __init__(self, file: IO[bytes]) -> None:
+        """Write to an open file, which is closed with the sink."""
+        self._file = file
 
     def write(self, packets: Sequence[bytes]) -> None:
         """Append packets."""
@@ -183,11 +180,14 @@ def parse_udp(address: str) -> tuple[str, int]:
 
 
 def open_sink(destination: str) -> Sink:
-    """Open ``udp:HOST:PORT`` or a file.
+    """Open ``udp:HOST:PORT``, or a file to append to.
 
     Raises:
         InputError: the address is wrong, or the file cannot be written.
     """
     if destination.startswith("udp:"):
         return UdpSink(*parse_udp(destination))
-    return FileSink(Path(destination))
+    try:
+        return FileSink(Path(destination).open("ab"))
+    except OSError as error:
+        raise InputError(f"{destination}: {error.strerror}") from None

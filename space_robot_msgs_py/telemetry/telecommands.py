@@ -72,6 +72,9 @@ class Telecommand(NamedTuple):
     function: str
     values: dict[str, Any]
 
+    def __str__(self) -> str:
+        return f"{self.function} {self.values.get('gain', '')}".rstrip()
+
 
 def functions(names: RobotNames, laws: Sequence[str]) -> tuple[Function, ...]:
     """Return the functions of a robot with these ``names`` and control ``laws``."""

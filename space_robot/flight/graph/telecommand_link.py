@@ -138,7 +138,7 @@ class TelecommandLink:
             self._execute(command, node)
         except (FlightError, InputError) as error:
             is_silent = "no answer" in str(error)
-            self._refuse(f"{command.function}: {error}")
+            self._refuse(f"{command}: {error}")
             report(NOT_COMPLETED, FailureCode.NO_ANSWER if is_silent else FailureCode.REFUSED)
             return
         self.counts["executed"] += 1

@@ -45,7 +45,7 @@ function connect() {
   socket.onmessage = ({ data }) => {
     const packet = JSON.parse(data);
     if (packet.reload) {
-      location.reload();
+      shown.length ? location.reload() : location.replace("/");
       return;
     }
     const utc = toMs(packet.time);
