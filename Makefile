@@ -5,7 +5,7 @@ VENV := .venv
 # Versions that are known to work; `make newest` goes without.
 CONSTRAINTS := constraints.txt
 # Extras with versions in it. Not apt, which has ROS's own NumPy, and not bench: Basilisk holds others back.
-CONSTRAINED := campaign dask dist docs gym mpc mutation notebooks parquet ros test view xacro
+CONSTRAINED := campaign dask dist docs ground gym mpc mutation notebooks parquet ros test view xacro
 PACKAGES := space_robot space_robot_control space_robot_model space_robot_msgs_py space_robot_sim
 # A file's tests run in one process; tests/conftest.py has the files in an order that fills all.
 # Two processes more than there are cores: graphs of nodes wait for one another.
@@ -31,7 +31,7 @@ export FASTDDS_BUILTIN_TRANSPORTS ?= UDPv4
 # Kernels compile in less time, and are as fast, with the same bits.
 export NUMBA_OPT ?= 1
 
-.PHONY: help setup fly test test-docs check quick coverage hooks lint kernels docs dist bench mutation notebooks \
+.PHONY: help setup fly test test-docs check quick coverage hooks lint kernels docs dist ground bench mutation notebooks \
   newest constraints clean
 
 help:
@@ -47,6 +47,7 @@ help:
 	@echo "make kernels             compile the dynamics and the laws, once"
 	@echo "make docs                docs/ as a site in site/, to be read without a network"
 	@echo "make dist                a wheel and a source distribution in dist/"
+	@echo "make ground              the ground display: its libraries, and Open MCT by npm"
 	@echo "make bench [ARGS=...]    how fast it is, e.g. make bench ARGS='plant laws'; --help tells more"
 	@echo "make mutation [ARGS=...] small faults put in, one at a time: do the tests notice?"
 	@echo "make notebooks           run docs/notebooks and keep what they show"
@@ -105,6 +106,10 @@ dist: $(VENV)/.made
 	rm -rf dist
 	$(VENV)/bin/python -m build
 	@ls dist/*
+
+ground: $(VENV)/.made
+	@$(PIP_INSTALL) --editable '.[ros,ground]'
+	npm install --prefix $(VENV)/openmct --no-audit --no-fund --ignore-scripts openmct@4.2.0
 
 bench: $(VENV)/.tests
 	@$(VENV)/bin/python tools/benchmarks $(ARGS)

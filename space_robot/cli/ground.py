@@ -69,6 +69,7 @@ def ground(
       space-robot ground flights/one --packets fast --from 10 --to 20
     """
     import asyncio
+    from tempfile import TemporaryDirectory
 
     from space_robot_msgs_py.errors import InputError
 
@@ -81,44 +82,43 @@ def ground(
     from ..flight.telemetry import database_path
     from ..processes.interruption import Interrupted
 
-    server = GroundServer(find_openmct(), is_live=bag is None)
-    if bag:
-        _fill(server, read(bag), packets)
-    path = database or database_path(f"udp:127.0.0.1:{udp}")
+    openmct = find_openmct()
+    with TemporaryDirectory() as folder:
+        if bag:
+            database = Path(folder) / "telemetry.xml"
+            server = GroundServer(openmct, database, is_live=False)
+            _fill(server, database, read(bag), packets)
+        else:
+            database = database or database_path(f"udp:127.0.0.1:{udp}")
+            server = GroundServer(openmct, database, is_live=True)
     try:
-        asyncio.run(_serve(server, port, udp, path, opens))
+        asyncio.run(_serve(server, port, udp, opens))
     except Interrupted:
         click.echo("ended", err=True)
 
 
-def _fill(server: GroundServer, log: FlightLog, packets: str) -> None:
+def _fill(server: GroundServer, database: Path, log: FlightLog, packets: str) -> None:
     """Give a server the packets of a log, as a receiver would have got them."""
-    from tempfile import TemporaryDirectory
-
     from space_packet_parser.generators.ccsds import ccsds_generator
 
     from space_robot_msgs_py.telemetry.downlink import Downlink, open_sink
 
     from ..flight.telemetry import TelemetryPlan
-    from ..ground.decoder import Decoder
 
-    plan = TelemetryPlan.of_log(log, packets)
-    with TemporaryDirectory() as folder:
-        database, file = Path(folder) / "telemetry.xml", Path(folder) / "packets"
-        database.write_text(plan.database, "utf-8")
-        server.use(Decoder(database))
-        downlink = Downlink(plan.structures, open_sink(str(file)))
-        plan.send(downlink, log)
-        downlink.close()
-        with file.open("rb") as stream:
-            for packet in ccsds_generator(stream):
-                server.receive(bytes(packet))
+    plan, file = TelemetryPlan.of_log(log, packets), database.with_name("packets")
+    database.write_text(plan.database, "utf-8")
+    downlink = Downlink(plan.structures, open_sink(str(file)))
+    plan.send(downlink, log)
+    downlink.close()
+    with file.open("rb") as stream:
+        for packet in ccsds_generator(stream):
+            server.receive(bytes(packet))
 
 
-async def _serve(server: GroundServer, port: int, udp: int, path: Path, opens: bool) -> None:
+async def _serve(server: GroundServer, port: int, udp: int, opens: bool) -> None:
     from ..ground.server import serve
 
-    events = serve(server, port, udp, path)
+    events = serve(server, port, udp)
     address = await anext(events)
     click.echo(f"the display is at {address}; Ctrl-C ends", err=True)
     if opens:

@@ -22,6 +22,8 @@ from .store import TelemetryStore
 HERE = Path(__file__).parent / "templates"
 LOCAL = "127.0.0.1"
 OPENMCT_VARIABLE = "SPACE_ROBOT_OPENMCT"
+LATE_S = 0.1
+"""Packets may come out of order by this much."""
 LOOK_S = 1.0
 """A new database is looked for this often, s."""
 
@@ -48,29 +50,49 @@ def find_openmct() -> Path:
 class GroundServer:
     """Serves the telemetry of one flight after the other, on this machine only."""
 
-    def __init__(self, openmct: Path, is_live: bool) -> None:
-        """Serve with Open MCT's files; ``is_live``: packets arrive while pages are open."""
-        self._openmct, self.is_live = openmct, is_live
+    def __init__(self, openmct: Path, database: Path, is_live: bool) -> None:
+        """Serve with Open MCT's files.
+
+        ``database``: of the packets, read when it is there and whenever it changes; ``is_live``:
+        packets arrive while pages are open.
+        """
+        self._openmct, self._database, self.is_live = openmct, database, is_live
         self._decoder: Decoder | None = None
+        self._read_ns, self._text = 0, ""
+        """Time of the last change of the database, and its text."""
         self.store = TelemetryStore()
         self._sockets: set[web.WebSocketResponse] = set()
         self._tasks: set[asyncio.Task[None]] = set()
         self.unknown = 0
         """Packets that the database does not describe."""
 
-    def use(self, decoder: Decoder) -> None:
-        """Describe the telemetry by a database from now on; open pages load it."""
-        self._decoder = decoder
-        self.store = TelemetryStore(decoder.catalogue()["events"])
+    def read_database(self) -> str:
+        """Read the database if it has changed; open pages load it. Return what happened, in words.
+
+        It is written at the beginning of each flight.
+        """
+        try:
+            changed_ns, text = self._database.stat().st_mtime_ns, ""
+            if changed_ns == self._read_ns or (text := self._database.read_text()) == self._text:
+                return ""
+            self._read_ns, self._text = changed_ns, text
+            self._decoder = Decoder(self._database)
+        except FileNotFoundError:
+            return ""
+        except InputError as error:
+            return f"warning: {error}"
+        self.store = TelemetryStore(self._decoder.catalogue()["events"])
         self._broadcast({"reload": True})
+        return f"database: {self._database}"
 
     def receive(self, data: bytes) -> None:
         """Decode and keep a packet, and send it to the open pages."""
+        self.read_database()
         packet = self._decoder.decode(data) if self._decoder else None
         if packet is None or not math.isfinite(packet.time_s):
             self.unknown += 1
             return
-        if packet.time_s < self.store.newest_s - 1.0:  # another flight, or a reset
+        if packet.time_s < self.store.newest_s - LATE_S:  # another flight, or a reset
             self.store.clear()
             self._broadcast({"reload": True})
         count = len(self.store.events)
@@ -153,11 +175,10 @@ class _Datagrams(asyncio.DatagramProtocol):
         self._receive(data)
 
 
-async def serve(server: GroundServer, port: int, udp: int, database: Path) -> AsyncIterator[str]:
+async def serve(server: GroundServer, port: int, udp: int) -> AsyncIterator[str]:
     """Serve pages at a port of this machine; yield the address, then what happens, in words.
 
-    Live: telemetry is received at the port ``udp``, and the ``database`` is read whenever it
-    changes.
+    Live: telemetry is received at the port ``udp``.
 
     Raises:
         InputError: a port is taken.
@@ -179,17 +200,9 @@ async def serve(server: GroundServer, port: int, udp: int, database: Path) -> As
             except OSError as error:
                 raise InputError(f"--udp {udp}: {error.strerror}") from None
             yield f"waiting for telemetry at udp:{LOCAL}:{udp}"
-        read_at = 0
         while True:
-            if server.is_live and database.is_file():
-                changed_at = database.stat().st_mtime_ns
-                if changed_at != read_at:
-                    read_at = changed_at
-                    try:
-                        server.use(Decoder(database))
-                        yield f"database: {database}"
-                    except InputError as error:
-                        yield f"warning: {error}"
+            if server.is_live and (news := server.read_database()):
+                yield news
             await asyncio.sleep(LOOK_S)
     finally:
         await runner.cleanup()
