@@ -42,6 +42,8 @@ MOST = 3
 """Laws that fly the other draws."""
 FEW = 48
 """Gain sets of each law for the satellites, and where only its front is searched."""
+FIRST_S = 40.0
+"""Of the satellites' missions, which last two minutes."""
 COMMAND = "docs/law_league.py"
 SENSED = {"sensors": "fine", "navigation": "filtered"}
 PAPER: dict[str, Any] = {"robot": "paper", "case": "1", **SENSED}
@@ -116,7 +118,8 @@ def scenario_of(name: str, folder: Path) -> dict[str, Any]:
         quick = ["--law", "ctc", "--law", "pd", "--evaluations", "1", "--runs", "2"]
         # the law is chosen below; with its first gains none may fly
         subprocess.run([*made, *quick], check=False, capture_output=True)
-    return {"robot": f"{robot}/", "case": "1", "actuators": "small_wheels", **SENSED}
+    first = {"duration": FIRST_S}
+    return {"robot": f"{robot}/", "case": "1", "actuators": "small_wheels", **SENSED, **first}
 
 
 def evidence(name: str, folder: Path, seed: int) -> dict[str, Any]:
