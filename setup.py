@@ -107,6 +107,7 @@ setup(
         # telemetry and telecommands; aiohttp serves the display
         "ground": [
             "aiohttp>=3.9",
+            "lxml>=5",
             "space-packet-parser>=6",
             "spacepackets>=0.32",
             "yamcs-pymdb>=1.3",
@@ -123,6 +124,7 @@ setup(
             "ros-rmw-fastrtps-cpp==8.4.3",  # Jazzy's: newer ones belong to other distributions
         ],
         "test": [
+            "aiohttp>=3.9",
             "build>=1.2",
             "cvxpy",
             "catkin_pkg",  # ROS's generators of interfaces
@@ -130,12 +132,9 @@ setup(
             "daqp>=0.8",
             "distributed>=2024.1",
             "gymnasium>=1.0",
-            "aiohttp>=3.9",
-            "space-packet-parser>=6",
-            "spacepackets>=0.32",
-            "yamcs-pymdb>=1.3",
             "hypothesis",
             "ipykernel",
+            "lxml>=5",
             "mermaidx",
             "mkdocs-material>=9.7",
             "mkdocstrings[python]>=1.0",
@@ -156,6 +155,8 @@ setup(
             "pytest-xdist",
             "ruff",
             "scipy-stubs",
+            "space-packet-parser>=6",
+            "spacepackets>=0.32",
             "setuptools>=70.1",  # builds wheels by itself
             "trimesh>=4",
             "types-PyYAML",
@@ -163,6 +164,7 @@ setup(
             "viser>=1.1",
             "websockets>=13",
             "xacro",
+            "yamcs-pymdb>=1.3",
             "ziamath",
         ],
         "view": ["trimesh>=4", "viser>=1.1"],  # `view`

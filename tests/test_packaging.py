@@ -29,14 +29,19 @@ PYPI |= {"cuda": "cuda-bindings"}
 PYPI |= {"sklearn": "scikit-learn", "threadpoolctl": "scikit-learn"}  # which brings it
 """Names on PyPI of modules that are not called as their package."""
 OF_EXTRAS = {
+    "aiohttp": "ground",
     "cuda-bindings": "gpu",
     "distributed": "dask",
     "gymnasium": "gym",
+    "lxml": "ground",
     "pandas": "campaign",
     "pyarrow": "parquet",
+    "space-packet-parser": "ground",
+    "spacepackets": "ground",
     "trimesh": "view",
     "viser": "view",
     "xacro": "xacro",
+    "yamcs-pymdb": "ground",
 }
 """Packages that one command needs, and their extra."""
 ROSDEP = {"pyyaml": "yaml", "rosbags": "rosbags-pip", "scikit-learn": "sklearn"}

@@ -15,16 +15,16 @@ from typing import Any
 from aiohttp import WSMsgType, web
 
 from space_robot_msgs_py.errors import InputError
+from space_robot_msgs_py.telemetry.downlink import LOOPBACK
 
 from .decoder import Decoder
 from .store import TelemetryStore
 
 HERE = Path(__file__).parent / "templates"
-LOCAL = "127.0.0.1"
 OPENMCT_VARIABLE = "SPACE_ROBOT_OPENMCT"
 LATE_S = 0.1
 """Packets may come out of order by this much."""
-LOOK_S = 1.0
+DATABASE_PERIOD_S = 1.0
 """A new database is looked for this often, s."""
 
 
@@ -187,22 +187,22 @@ async def serve(server: GroundServer, port: int, udp: int) -> AsyncIterator[str]
     await runner.setup()
     try:
         try:
-            await web.TCPSite(runner, LOCAL, port).start()
+            await web.TCPSite(runner, LOOPBACK, port).start()
         except OSError as error:
             raise InputError(f"--port {port}: {error.strerror}") from None
-        yield f"http://{LOCAL}:{runner.addresses[0][1]}/"
+        yield f"http://{LOOPBACK}:{runner.addresses[0][1]}/"
         if server.is_live:
             loop = asyncio.get_running_loop()
             try:
                 await loop.create_datagram_endpoint(
-                    lambda: _Datagrams(server.receive), local_addr=(LOCAL, udp)
+                    lambda: _Datagrams(server.receive), local_addr=(LOOPBACK, udp)
                 )
             except OSError as error:
                 raise InputError(f"--udp {udp}: {error.strerror}") from None
-            yield f"waiting for telemetry at udp:{LOCAL}:{udp}"
+            yield f"waiting for telemetry at udp:{LOOPBACK}:{udp}"
         while True:
             if server.is_live and (news := server.read_database()):
                 yield news
-            await asyncio.sleep(LOOK_S)
+            await asyncio.sleep(DATABASE_PERIOD_S)
     finally:
         await runner.cleanup()

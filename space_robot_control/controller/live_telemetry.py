@@ -28,7 +28,7 @@ from space_robot_msgs_py.telemetry.downlink import (
     open_sink,
 )
 from space_robot_msgs_py.telemetry.structures import (
-    REFERENCE,
+    REFERENCE_PREFIX,
     UNKNOWN_LAW,
     Structures,
     TelemetrySettings,
@@ -106,8 +106,8 @@ class LiveTelemetry:
                 return np.array([self._laws.get(supervisor.controller.law.name, UNKNOWN_LAW)])
             if name in SIGNALS:
                 return np.asarray(state.block[name])
-            if name.startswith(REFERENCE):
-                return np.asarray(reference[name.removeprefix(REFERENCE)])
+            if name.startswith(REFERENCE_PREFIX):
+                return np.asarray(reference[name.removeprefix(REFERENCE_PREFIX)])
             if name in LAW_SIGNALS:
                 return supervisor.telemetry()[LAW_SIGNALS.index(name)][np.newaxis]
             both = torque[np.newaxis]

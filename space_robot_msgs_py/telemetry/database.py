@@ -8,8 +8,8 @@ from typing import Any
 import yamcs.pymdb as xtce
 
 from .downlink import EVENT_REPORTING, HOUSEKEEPING, PARAMETER_REPORT, EventKind
-from .structures import UNKNOWN_LAW, Parameter, Structures, identifier, numbers_of_laws
-from .telecommands import FUNCTION_MANAGEMENT, PERFORM, Argument, functions
+from .structures import UNKNOWN_LAW, Structures, TmParameter, identifier, numbers_of_laws
+from .telecommands import FUNCTION_MANAGEMENT, PERFORM, TcArgument, functions
 
 Limits = Mapping[str, Sequence[tuple[float, float]]]
 """Lowest and highest value of each number of a signal; infinite: none."""
@@ -36,7 +36,7 @@ SECONDARY = {
 }
 """Bits of the fields of a telemetry packet's secondary header (ECSS-E-ST-70-41C) up to the time."""
 TIME_BITS, TIME_COUNT_S = 56, 2.0**-24
-MODES = ("nominal", "holding", "safe")
+MODE_NAMES = ("nominal", "holding", "safe")
 ROOT_CONTAINER = "telemetry_packet"
 ENCODINGS = {
     "float64": xtce.float64_t,
@@ -121,7 +121,7 @@ class _Telemetry:
             encoding=xtce.uint8_t,
         )
         mode = xtce.EnumeratedParameter(
-            system, "mode", list(enumerate(MODES)), encoding=xtce.uint8_t
+            system, "mode", list(enumerate(MODE_NAMES)), encoding=xtce.uint8_t
         )
         events = self._container(
             "events",
@@ -156,7 +156,7 @@ class _Telemetry:
         entries = [xtce.ParameterEntry(parameter) for parameter in parameters]
         return xtce.Container(self._system, name, entries=entries, **settings)
 
-    def _value(self, parameter: Parameter) -> Any:
+    def _value(self, parameter: TmParameter) -> Any:
         declared = parameter.declaration
         is_count = parameter.encoding.startswith("int")
         ends = self._limits.get(parameter.signal, ())
@@ -214,7 +214,7 @@ def _add_commands(system: Any, structures: Structures, laws: Sequence[str]) -> N
         )
 
 
-def _argument(argument: Argument) -> Any:
+def _argument(argument: TcArgument) -> Any:
     about: dict[str, Any] = {"units": argument.unit or None, "short_description": argument.text}
     if argument.choices:
         choices = [(number, name) for name, number in argument.choices.items()]

@@ -16,6 +16,7 @@ import numpy as np
 from ..errors import InputError
 from .structures import Columns, Structures
 
+LOOPBACK = "127.0.0.1"
 TIME_FORMAT = 0x2F
 """P-field of CCSDS unsegmented time (301.0-B-4): own epoch, 4 octets of seconds and 3 below."""
 HOUSEKEEPING, EVENT_REPORTING = 3, 5

@@ -11,7 +11,7 @@ from ..errors import InputError
 from ..samples import SIGNALS, TelemetrySignals
 from ..signals import signals_of
 from .downlink import EventKind, TelemetryEvent
-from .structures import REFERENCE, UNKNOWN_LAW, Array, Columns, numbers_of_laws
+from .structures import REFERENCE_PREFIX, UNKNOWN_LAW, Array, Columns, numbers_of_laws
 
 
 def log_columns(log: FlightLog, laws: Sequence[str]) -> Columns:
@@ -27,8 +27,8 @@ def log_columns(log: FlightLog, laws: Sequence[str]) -> Columns:
     def column(name: str) -> Array:
         if name == "law":
             return _law_numbers(log, laws)
-        if name.startswith(REFERENCE):
-            return np.asarray(references[name.removeprefix(REFERENCE)])
+        if name.startswith(REFERENCE_PREFIX):
+            return np.asarray(references[name.removeprefix(REFERENCE_PREFIX)])
         if name in telemetry:
             if log.telemetry is not None:
                 return np.asarray(log.telemetry[:, telemetry.index(name)])

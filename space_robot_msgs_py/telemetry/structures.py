@@ -31,7 +31,7 @@ Columns = Callable[[str], Array]
 """Values (k, ...) of a signal at k ticks; the signal ``law`` is the number of the law in force."""
 Encoding = Literal["float64", "float32", "int32", "int16"]
 
-REFERENCE = "reference_"
+REFERENCE_PREFIX = "reference_"
 _APART = {
     name: field.topic
     for name in ORBIT_FIELDS
@@ -41,7 +41,7 @@ _APART = {
 """Topic of each signal of an orbit that a sensor measures."""
 TELEMETERED: dict[str, Signal] = {
     **{n: signal for n, signal in SIGNALS.items() if n not in ORBIT_FIELDS or n in _APART},
-    **{f"{REFERENCE}{name}": signal for name, signal in signals_of(Reference).items()},
+    **{f"{REFERENCE_PREFIX}{name}": signal for name, signal in signals_of(Reference).items()},
     **signals_of(CommandSignals),
     **signals_of(TelemetrySignals),
 }
@@ -97,7 +97,7 @@ class TelemetrySettings(StrictModel):
         return validate(cls, read_yaml(path), str(path))
 
 
-class Parameter(NamedTuple):
+class TmParameter(NamedTuple):
     """A number in a packet."""
 
     name: str
@@ -191,7 +191,7 @@ class Structures:
             return 0
         return TELEMETERED[signal].width(self.names)
 
-    def parameters(self) -> Iterator[tuple[Structure, list[Parameter]]]:
+    def parameters(self) -> Iterator[tuple[Structure, list[TmParameter]]]:
         """Yield each structure with its parameters in order.
 
         A signal that several structures have has the structure's name in the later ones.
@@ -206,7 +206,7 @@ class Structures:
                     name = f"{prefix}{entry.signal}{label}"
                     used.add(name)
                     parameters.append(
-                        Parameter(name, entry.signal, index, entry.encoding, entry.scale)
+                        TmParameter(name, entry.signal, index, entry.encoding, entry.scale)
                     )
             yield structure, parameters
 

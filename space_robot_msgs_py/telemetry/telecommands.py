@@ -39,7 +39,7 @@ class RefusedTelecommand(SpaceRobotError):  # noqa: N818
         self.code = code
 
 
-class Argument(NamedTuple):
+class TcArgument(NamedTuple):
     """An argument of a function: a number, one of some choices, or a text."""
 
     name: str
@@ -51,13 +51,13 @@ class Argument(NamedTuple):
     """Octets of a text; 0: a number."""
 
 
-class Function(NamedTuple):
+class TcFunction(NamedTuple):
     """A function that telecommands perform."""
 
     number: int
     name: str
     text: str
-    arguments: tuple[Argument, ...] = ()
+    arguments: tuple[TcArgument, ...] = ()
 
     @property
     def layout(self) -> struct.Struct:
@@ -76,30 +76,30 @@ class Telecommand(NamedTuple):
         return f"{self.function} {self.values.get('gain', '')}".rstrip()
 
 
-def functions(names: RobotNames, laws: Sequence[str]) -> tuple[Function, ...]:
+def functions(names: RobotNames, laws: Sequence[str]) -> tuple[TcFunction, ...]:
     """Return the functions of a robot with these ``names`` and control ``laws``."""
-    duration = Argument("duration", "0: as fast as the limits allow", "s")
+    duration = TcArgument("duration", "0: as fast as the limits allow", "s")
     joints = (
-        Argument(f"position_{identifier(name)}", f"position of {name}, m if it slides", "rad")
+        TcArgument(f"position_{identifier(name)}", f"position of {name}, m if it slides", "rad")
         for name in names.joints
     )
-    values = (Argument(f"value_{name}", f"value of the axis {name}") for name in names.axes)
-    law = Argument("law", "control law", choices=numbers_of_laws(laws))
-    gain = Argument("gain", "LAW.GAIN, such as tde_stc.k1", length=NAME_BYTES)
-    point = Argument(
+    values = (TcArgument(f"value_{name}", f"value of the axis {name}") for name in names.axes)
+    law = TcArgument("law", "control law", choices=numbers_of_laws(laws))
+    gain = TcArgument("gain", "LAW.GAIN, such as tde_stc.k1", length=NAME_BYTES)
+    point = TcArgument(
         "point", "what the base points at", choices={n: k for k, n in enumerate(POINTS)}
     )
     return (
-        Function(1, "select_law", "Swap to another control law", (law,)),
-        Function(2, "set_gain", "Set a gain of a law on all axes", (gain, *values)),
-        Function(3, "go_to", "Move the joints in place of the mission", (duration, *joints)),
-        Function(4, "point", "Point the base in place of the mission", (point, duration)),
-        Function(5, "pause", "Pause the simulation"),
-        Function(6, "resume", "Resume the paused simulation"),
+        TcFunction(1, "select_law", "Swap to another control law", (law,)),
+        TcFunction(2, "set_gain", "Set a gain of a law on all axes", (gain, *values)),
+        TcFunction(3, "go_to", "Move the joints in place of the mission", (duration, *joints)),
+        TcFunction(4, "point", "Point the base in place of the mission", (point, duration)),
+        TcFunction(5, "pause", "Pause the simulation"),
+        TcFunction(6, "resume", "Resume the paused simulation"),
     )
 
 
-def read_telecommand(packet: Any, apid: int, known: Sequence[Function]) -> Telecommand:
+def read_telecommand(packet: Any, apid: int, known: Sequence[TcFunction]) -> Telecommand:
     """Return what a packet (`spacepackets.ecss.PusTc`) asks for.
 
     Raises:
@@ -125,7 +125,7 @@ def read_telecommand(packet: Any, apid: int, known: Sequence[Function]) -> Telec
     return Telecommand(function.name, {a.name: _value(a, value) for a, value in values})
 
 
-def _value(argument: Argument, value: Any) -> Any:
+def _value(argument: TcArgument, value: Any) -> Any:
     if argument.length:
         try:
             return bytes(value).rstrip(b"\0").decode("ascii")
@@ -145,7 +145,7 @@ def _value(argument: Argument, value: Any) -> Any:
 
 
 def write_telecommand(
-    function: Function, values: Mapping[str, Any], apid: int, sequence_count: int = 0
+    function: TcFunction, values: Mapping[str, Any], apid: int, sequence_count: int = 0
 ) -> bytes:
     """Return the packet that performs a function; choices in ``values`` are names."""
     from spacepackets.ecss.tc import PusTc

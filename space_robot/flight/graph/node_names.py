@@ -16,6 +16,7 @@ NODE_NAMES = tuple(f"{node}_node" for node in ORDER)
 """Names of nodes and executables, in that order."""
 PLANT = NODE_NAMES[-1]
 MISSION = NODE_NAMES[1]
+CONTROLLER_NODE = NODE_NAMES[2]
 
 
 def started_nodes(without: Collection[str]) -> tuple[str, ...]:

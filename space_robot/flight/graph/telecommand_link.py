@@ -14,11 +14,11 @@ from typing import Any
 from typing_extensions import Self
 
 from space_robot_msgs_py.errors import FlightError, InputError
-from space_robot_msgs_py.telemetry.downlink import cuc_time, parse_udp
+from space_robot_msgs_py.telemetry.downlink import LOOPBACK, cuc_time, parse_udp
 from space_robot_msgs_py.telemetry.telecommands import (
     FailureCode,
-    Function,
     RefusedTelecommand,
+    TcFunction,
     Telecommand,
     functions,
     read_telecommand,
@@ -26,11 +26,9 @@ from space_robot_msgs_py.telemetry.telecommands import (
 
 from ..plan import Flight
 from ..telemetry import TelemetryPlan, check_libraries
-from .node_names import MISSION, NODE_NAMES, PLANT
+from .node_names import CONTROLLER_NODE, MISSION, PLANT
 from .node_services import TemporaryNode, call_trigger, set_parameters
 
-CONTROLLER = NODE_NAMES[2]
-LOCAL = "127.0.0.1"
 LOOK_S = 0.2
 """The end is looked for this often, s."""
 LARGEST, MOST_KEPT = 65_535, 20
@@ -56,16 +54,16 @@ class TelecommandLink:
         """
         check_libraries()
         host, port = parse_udp(address)
-        if host not in (LOCAL, "localhost"):
-            raise InputError(f"telecommands are received at {LOCAL} only, got {host!r}")
+        if host not in (LOOPBACK, "localhost"):
+            raise InputError(f"telecommands are received at {LOOPBACK} only, got {host!r}")
         plan = TelemetryPlan.of_flight(flight)
         self._apid = plan.structures.apid
-        self._functions: tuple[Function, ...] = functions(plan.structures.names, plan.laws)
+        self._functions: tuple[TcFunction, ...] = functions(plan.structures.names, plan.laws)
         self._joints = plan.structures.names.joints
         self._to_degrees = plan.robot.to_degrees
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         try:
-            self._socket.bind((LOCAL, port))
+            self._socket.bind((LOOPBACK, port))
         except OSError as error:
             self._socket.close()
             raise InputError(f"{address}: {error.strerror}") from None
@@ -148,10 +146,10 @@ class TelecommandLink:
     def _execute(self, command: Telecommand, node: Any) -> None:
         name, values = command
         if name == "select_law":
-            set_parameters(node, CONTROLLER, {"controller": values["law"]}, self._check)
+            set_parameters(node, CONTROLLER_NODE, {"controller": values["law"]}, self._check)
         elif name == "set_gain":
             gains = [value for key, value in values.items() if key != "gain"]
-            set_parameters(node, CONTROLLER, {values["gain"]: gains}, self._check)
+            set_parameters(node, CONTROLLER_NODE, {values["gain"]: gains}, self._check)
         elif name in ("pause", "resume"):
             is_done, why = call_trigger(node, f"{PLANT}/{name}", self._check)
             if not is_done:
