@@ -25,7 +25,8 @@ from space_robot_msgs_py import topics
 ROOT = Path(__file__).resolve().parents[1]
 EXECUTABLES = sorted((ROOT / "resource/executables").iterdir())
 PYPI = {"yaml": "pyyaml", "typing_extensions": "typing-extensions", "pinocchio": "pin"}
-PYPI |= {"cuda": "cuda-bindings"}
+PYPI |= {"cuda": "cuda-bindings", "yamcs": "yamcs-pymdb"}
+PYPI |= {"space_packet_parser": "space-packet-parser"}
 PYPI |= {"sklearn": "scikit-learn", "threadpoolctl": "scikit-learn"}  # which brings it
 """Names on PyPI of modules that are not called as their package."""
 OF_EXTRAS = {
