@@ -61,6 +61,7 @@ setup(
         "space_robot.ground": ["templates/*"],
         "space_robot.help": ["*.md"],
         "space_robot.paper": ["templates/*.j2"],
+        "space_robot.trace": ["templates/*.j2"],
         "space_robot.view": ["templates/*"],
         "space_robot_control.flight_code": ["templates/*.j2"],
         "space_robot_msgs_py.ros": ["*.xml"],

@@ -15,15 +15,13 @@ from space_robot.scenario.faults import KINDS
 
 ROOMS = {
     "space_robot_msgs_py": "errors simulated_time topics compiled signals samples config wire bag "
-    "telemetry "
-    "ros recorder_node",
+    "telemetry ros recorder_node",
     "space_robot_model": "elementary dynamics robot hardware orbit",
     "space_robot_sim": "faults component environment actuators sensors plant plant_node",
     "space_robot_control": "laws navigation allocation controller flight_code controller_node "
     "guidance mission_node",
     "space_robot": "console processes scenario tuning flight gpu export analysis view ground api "
-    "learning "
-    "campaign choice paper doctor help cli __main__",
+    "learning campaign trace choice paper doctor help cli __main__",
 }
 """Of each package, from the ground up: a room imports only from rooms that stand before it."""
 VAGUE = {"found", "given", "told"}

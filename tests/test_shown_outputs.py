@@ -33,6 +33,12 @@ def test_the_sizing_of_analysis_is_what_analyze_prints(bags: Path) -> None:
     check(shown, printed, "what actuators small_wheels")
 
 
+def test_the_verdicts_of_requirements_are_what_trace_prints() -> None:
+    shown = block("docs/manual/requirements.md", "Requirements of the paper's", "3 requirements: ")
+    ids = ("--only", "PNT-001,PNT-003,TRK-001")
+    check(shown, run("trace", *ids, "--workers", "0", columns=110), "Requirements of the paper's")
+
+
 def test_a_bag_is_as_large_as_the_page_says(bags: Path) -> None:
     """To a hundredth: versions of lz4 compress a little differently."""
     text = (ROOT / "docs/manual/bags.md").read_text("utf-8")

@@ -18,7 +18,7 @@ from space_robot_msgs_py.config.validation import StrictModel, read_yaml, short,
 from space_robot_msgs_py.errors import InputError, explained_by
 
 from ..analysis.analysed_log import PointingBudget
-from ..analysis.measure import Window
+from ..analysis.measure import Window, describe
 from ..analysis.own_metric import check_names, importable_text
 from ..scenario.objects import as_disturbance
 from ..scenario.options import OPTIONS
@@ -63,8 +63,12 @@ def short_names(laws: Sequence[str]) -> dict[str, str]:
     return {law: Law.parse(law).controller if len(sets) == 1 else law for law in laws}
 
 
-class Requirement(StrictModel):
-    """A bound on a metric in a time window, to be met by a share of all runs."""
+RequirementId = Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_.-]*$")]
+"""Identifier of a requirement in a file of requirements, such as ``PNT-001``."""
+
+
+class Condition(StrictModel):
+    """A bound on a metric in a time window."""
 
     metric: Annotated[str, Field(min_length=1)]
     from_s: Annotated[float, Field(ge=0.0)] = 0.0
@@ -72,9 +76,6 @@ class Requirement(StrictModel):
     """None: to the end of the flight."""
     below: float | None = None
     above: float | None = None
-    share: Annotated[float, Field(gt=0.0, lt=1.0, alias="in")]
-    """Share of the runs that must meet the bound."""
-    confidence: Annotated[float, Field(gt=0.0, lt=1.0)] = 0.9
 
     @model_validator(mode="after")
     def _makes_sense(self) -> Self:
@@ -105,14 +106,27 @@ class Requirement(StrictModel):
         way = "below" if self.above is None else "above"
         end = "" if self.to_s is None else f" to {self.to_s:g} s"
         window = f" from {self.from_s:g} s{end}" if self.from_s or end else ""
-        return (
-            f"{self.metric} {way} {self.bound:g}{window} in {100.0 * self.share:g} % of the cases, "
-            f"with {100.0 * self.confidence:g} % confidence"
-        )
+        unit = describe(self.metric).unit.strip("-").replace("share", "")
+        return f"{self.metric} {way} {f'{self.bound:g} {unit}'.rstrip()}{window}"
 
     def is_met(self, value: float) -> bool:
         """Return True if a flight's value meets the bound; False for NaN."""
         return self.sign * value < self.sign * self.bound
+
+
+class Requirement(Condition):
+    """A condition to be met by a share of all runs."""
+
+    share: Annotated[float, Field(gt=0.0, lt=1.0, alias="in")]
+    """Share of the runs that must meet the bound."""
+    confidence: Annotated[float, Field(gt=0.0, lt=1.0)] = 0.9
+    id: RequirementId | None = None
+    """Identifier in a file of requirements."""
+
+    def __str__(self) -> str:
+        share, confidence = 100.0 * self.share, 100.0 * self.confidence
+        demand = super().__str__()
+        return f"{demand} in {share:g} % of the cases, with {confidence:g} % confidence"
 
 
 class Keep(StrictModel):

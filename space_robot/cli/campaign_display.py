@@ -49,7 +49,7 @@ def print_summary(flown: FlownCampaign, console: Console) -> None:
     print_table(medians(flown.table, names, flown.seed, list(flown.study.metrics)), console)
     rows = [
         [
-            f"{v.requirement}, {v.point}" if v.point else v.requirement,
+            " ".join(filter(None, (v.id, v.requirement))) + (f", {v.point}" if v.point else ""),
             names[v.law],
             f"{v.met} of {v.runs}",
             v.limits.low,

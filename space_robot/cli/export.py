@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from ..console.tables import Column, JudgedCell, Table, named
+from .option_types import names_in
 from .options import flight_options, plan_flight
 
 if TYPE_CHECKING:
@@ -41,6 +42,12 @@ if TYPE_CHECKING:
     "--verify", "is_verified", is_flag=True, help="Build and replay with all compilers here."
 )
 @click.option(
+    "--requirements",
+    metavar="FILE",
+    shell_complete=names_in("requirements"),
+    help="Name in the header the requirements of this file allocated to flight_software.",
+)
+@click.option(
     "--acceptance-seconds",
     type=click.FloatRange(min=0.01),
     metavar="S",
@@ -52,6 +59,7 @@ def export(
     out: Path,
     force: bool,
     is_verified: bool,
+    requirements: str | None,
     acceptance_seconds: float | None,
     **options: Any,
 ) -> None:
@@ -79,11 +87,14 @@ def export(
     from ..export.software import recorded_flights
     from ..flight.compilation import compile_kernels
     from ..scenario.scenario import Scenario
+    from ..trace.requirements import read_requirements
 
     check_folder(out, force)
+    every = read_requirements(requirements).requirements if requirements else {}
+    allocated = [f"{id_}: {r.text}" for id_, r in every.items() if r.allocated_to]
     flight = plan_flight(**options)
     flight.check_in_process()
-    exported = export_software(flight, laws)
+    exported = export_software(flight, laws, allocated)
     compile_kernels(bool(flight.plant.names.actuators))
     plan = validate(Scenario, options, "options")
     flights = recorded_flights(plan, exported, laws, acceptance_seconds)

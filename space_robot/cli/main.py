@@ -33,7 +33,7 @@ SECTIONS = {
     "Begin": ("completion", "doctor", "examples", "help"),
     "Fly": ("fly", "goto", "scenario", "sim", "simulate"),
     "Robots, missions and own pieces": ("new", "plan", "robot", "urdf"),
-    "Results": ("analyze", "diff", "replay", "view"),
+    "Results": ("analyze", "diff", "replay", "trace", "view"),
     "Gains and studies": ("campaign", "choose", "gains", "reproduce", "stability"),
     "Flight code and ground": ("export", "ground", "telemetry"),
 }
@@ -118,6 +118,7 @@ def cli() -> None:
       space-robot sim step --ticks 10               a running graph, paused and stepped
       space-robot campaign run sensor_grades        laws over grades of sensors
       space-robot campaign run FILE --runs 1000     dispersed flights: verdicts with confidence
+      space-robot trace                             requirements, verified by flights and tests
       space-robot reproduce                         the paper's Table V and figures
       space-robot doctor                            what this machine has for flights
       space-robot help                              short answers by topic

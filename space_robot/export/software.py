@@ -44,7 +44,9 @@ def exported_laws(flight: Flight, further: Sequence[str] = ()) -> list[ControlLa
     return list({law.name: law for law in laws}.values())
 
 
-def export(flight: Flight, further: Sequence[str] = ()) -> Exported:
+def export(
+    flight: Flight, further: Sequence[str] = (), requirements: Sequence[str] = ()
+) -> Exported:
     """Translate the flight software of a flight that has not begun.
 
     Raises:
@@ -63,7 +65,7 @@ def export(flight: Flight, further: Sequence[str] = ()) -> Exported:
         {"robot": robot, "controller": "parameters of controller_node", **sources},
     )
     text = yaml.safe_dump(scenario.tree)
-    return Exported(software, scenario.robots.controller.name, text)
+    return Exported(software, scenario.robots.controller.name, text, requirements)
 
 
 FAULTS = (

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from functools import cached_property
 from math import prod
 from pathlib import PurePosixPath
+from textwrap import fill
 from typing import Any, NamedTuple
 
 import jinja2
@@ -18,7 +19,7 @@ from space_robot_msgs_py.samples import Reference, State
 
 from .c99 import language as lang
 from .c99.language import literal
-from .files import comment, descriptions, wrapped
+from .files import WIDTH, comment, descriptions, wrapped
 from .software import FlightSoftware, Part, Translated, numbers_of, translate
 
 FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-fno-tree-vectorize")
@@ -30,16 +31,23 @@ WARNINGS = ("-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Wdouble-promotio
 class Exported:
     """The flight software as files of C."""
 
-    def __init__(self, software: FlightSoftware, robot: str = "", scenario: str = "") -> None:
+    def __init__(
+        self,
+        software: FlightSoftware,
+        robot: str = "",
+        scenario: str = "",
+        requirements: Sequence[str] = (),
+    ) -> None:
         """Translate the flight software.
 
         Args:
             software: what flies.
             robot: name of the robot, for comments.
             scenario: text whose digest names the scenario; empty: the parameters themselves.
+            requirements: identifier and text of each that is allocated to it, for the header.
         """
         self.translated: Translated = translate(software)
-        self.software, self.robot = software, robot
+        self.software, self.robot, self.requirements = software, robot, requirements
         self._entries = [
             entry for part in software.parts for entry in entries(self.translated, part)
         ]
@@ -127,6 +135,7 @@ class Exported:
         records: list[type[Record]] = [State, Reference, *(part.record for part in parts)]
         return self.render(
             "space_robot_flight.h",
+            requirements="".join(comment(fill(text, WIDTH - 4)) for text in self.requirements),
             laws=[law.name for law in self.software.laws],
             structs=self.translated.files.structs(records),
             parts=[(part.name, program.struct_name(part.record)) for part in parts],

@@ -99,6 +99,7 @@ NOT_RUN = {
     r"ROS_DOMAIN_ID=7 python examples": "two terminals: test_examples.py runs it",
     r"space-robot ground\b|npm\b": "never ends; a browser: tests/laboratory/ground has one",
     r"space-robot fly .*--tele": "two terminals: tests/laboratory/flight/graph flies",
+    r"space-robot trace( --out| *#|$)": "all 30, a minute: tests/laboratory/trace verifies them",
     r"space-robot goto\b": "two terminals: test_pause_and_step.py flies and moves",
     r"space-robot analyze flights/tde_stc_case1_": "printed at a flight's end",
     r"space-robot view flights/mine": "a flight of the reader's robot: tests/laboratory/view",

@@ -64,6 +64,7 @@ class Preparation:
     def manifest(self) -> Manifest:
         """Manifest of the campaign's folder."""
         where, own, budget = self.study.where, self.study.metrics, self.study.pointing
+        require, key = self.study.require, f"{where}: require"
         flights = self.flights.values()  # before metrics: what is wrong with a law is said first
         try:  # they have columns of their own
             check_names(own)
@@ -72,10 +73,10 @@ class Preparation:
         except InputError as error:
             raise InputError(f"{where}: metrics: {error}") from None
         for flight in flights:
-            check_requirements(flight, self.study.require, where, own=own, budget=budget)
-        if self.study.require:
+            check_requirements(flight, require, key, own=own, budget=budget)
+        if require:
             for option, flight in self.flyer.draws.option_flights():
-                check_requirements(flight, self.study.require, where, option, own, budget)
+                check_requirements(flight, require, key, option, own, budget)
         study = self.study.content
         return Manifest(
             seed=self.seed,

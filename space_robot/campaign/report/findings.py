@@ -79,6 +79,12 @@ class Quantity(NamedTuple):
         return self.column.partition(".")[2]
 
     @property
+    def title(self) -> str:
+        """Return the name, after the identifier of the requirement if it has one."""
+        id_ = self.requirement.id if self.requirement else None
+        return f"{id_} {self.name}" if id_ else self.name
+
+    @property
     def label(self) -> str:
         """Return heading and unit, for an axis."""
         return f"{self.heading} ({self.unit})" if self.unit else self.heading

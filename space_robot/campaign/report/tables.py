@@ -72,7 +72,7 @@ def summary_table(findings: Findings) -> Table:
                 cases = ", ".join(named) if len(named) <= MOST_CASES else f"{len(named)} cases"
                 if len(named) == len(findings.laws) * len(findings.points) > 1:
                     cases = f"all {len(named)} cases"
-                rows.append([quantity.name, JudgedCell(f"{cases}:", word, TONES[word])])
+                rows.append([quantity.title, JudgedCell(f"{cases}:", word, TONES[word])])
     rows += [["remark", text] for text in findings.remarks]
     return Table.of("Findings", _columns(["", ""]), rows)
 
@@ -140,7 +140,7 @@ def verdict_table(findings: Findings, quantity: Quantity) -> Table:
         for v in findings.verdicts
         if v.requirement == quantity.name
     ]
-    return Table.of(f"{quantity.name}: {demand_text(quantity)}", columns, rows)
+    return Table.of(f"{quantity.title}: {demand_text(quantity)}", columns, rows)
 
 
 def _verdict_row(v: Verdict, name: str) -> list[str | JudgedCell]:
@@ -177,7 +177,7 @@ def verdict_grid(findings: Findings, quantity: Quantity) -> Table:
         for point in findings.points
     ]
     columns = _columns(_grid_names(findings), list(findings.names.values()))
-    return Table.of(f"{quantity.name}: {demand_text(quantity)}", columns, rows)
+    return Table.of(f"{quantity.title}: {demand_text(quantity)}", columns, rows)
 
 
 def _grid_names(findings: Findings) -> list[str]:

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from space_robot_msgs_py.bag.flight_log import FlightLog
+from space_robot_msgs_py.bag.flight_log import FlightLog, MeasuredStates
 from space_robot_msgs_py.config.validation import one_of
 from space_robot_msgs_py.errors import InputError
 
@@ -23,7 +23,7 @@ from ...analysis.torques import lacking_for_ripple
 from ...analysis.words import WARNING_GROUPS, warnings
 from ...flight.flown_log import empty_log
 from ...flight.plan import Flight
-from ..study import Requirement
+from ..study import Condition, Requirement
 
 Array = NDArray[np.float64]
 
@@ -71,7 +71,10 @@ def planned(flight: Flight, budget: PointingBudget | None = None) -> AnalysedLog
     def allocate(shape: tuple[int, ...]) -> Array:
         return np.broadcast_to(np.nan, shape)  # takes no memory
 
-    return AnalysedLog(empty_log(flight, allocate=allocate, is_brief=True), budget)
+    log = empty_log(flight, allocate=allocate, is_brief=True)
+    if not flight.plant.measures_truth:
+        log.measured = MeasuredStates.unknown(log, allocate)
+    return AnalysedLog(log, budget)
 
 
 def row_metrics(flight: AnalysedLog, require: Iterable[Requirement] = ()) -> list[str]:
@@ -151,7 +154,7 @@ def measure_row(
 
 def check_requirements(
     flight: Flight,
-    require: Mapping[str, Requirement],
+    require: Mapping[str, Condition],
     where: str,
     context: str = "",
     own: Collection[str] = (),
@@ -159,14 +162,15 @@ def check_requirements(
 ) -> None:
     """Check that a flight has the metrics of all requirements, or the user's ``own`` names.
 
-    Errors name the file, ``where``, and the difference from the nominal flight, ``context``.
+    Errors name the key of the mapping, ``where``, and the difference from the nominal flight,
+    ``context``.
     """
     if not require:
         return
     known, end = list(names(planned(flight, budget))), flight.ticks * flight.period
     context = context and f" ({context})"
     for name, demand in require.items():
-        key = f"{where}: require.{name}"
+        key = f"{where}.{name}"
         try:
             one_of(demand.metric, (*known, *own), "metric", f" in {key}.metric")
         except InputError as error:

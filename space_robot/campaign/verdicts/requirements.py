@@ -229,6 +229,8 @@ class Verdict:
 
     None if decided already, if it cannot be predicted, and for a fixed sample.
     """
+    id: str | None
+    """Identifier of the requirement in a file of requirements."""
 
     @property
     def met(self) -> int:
@@ -306,6 +308,7 @@ def verdict(
         bound,
         needed,
         projected,
+        demand.id,
     )
 
 

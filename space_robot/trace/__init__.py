@@ -1,0 +1,1 @@
+"""Requirements traced to evidence: flights, campaigns, tests, analyses, inspections."""
