@@ -63,7 +63,7 @@ setup(
         "space_robot.paper": ["templates/*.j2"],
         "space_robot.trace": ["templates/*.j2"],
         "space_robot.view": ["templates/*"],
-        "space_robot_control.flight_code": ["templates/*.j2"],
+        "space_robot_control.flight_code": [f"templates/{'*/' * k}*.j2" for k in range(3)],
         "space_robot_msgs_py.ros": ["*.xml"],
     },
     python_requires=">=3.10,<3.14",
@@ -104,6 +104,7 @@ setup(
             "ruff",  # wraps the signatures
             "ziamath",
         ],
+        "frameworks": ["fprime-fpp>=3"],  # checks `export --framework fprime`
         "gpu": ["cuda-bindings>=13", "nvidia-cuda-nvrtc>=13"],  # flights on NVIDIA devices
         # telemetry and telecommands; aiohttp serves the display
         "ground": [
@@ -132,6 +133,7 @@ setup(
             "cuda-bindings>=13",
             "daqp>=0.8",
             "distributed>=2024.1",
+            "fprime-fpp>=3",
             "gymnasium>=1.0",
             "hypothesis",
             "ipykernel",

@@ -48,6 +48,11 @@ if TYPE_CHECKING:
     help="Name in the header the requirements of this file allocated to flight_software.",
 )
 @click.option(
+    "--framework",
+    type=click.Choice(["fprime", "cfs"]),
+    help="Also write a component for F' or an application for cFS.",
+)
+@click.option(
     "--acceptance-seconds",
     type=click.FloatRange(min=0.01),
     metavar="S",
@@ -60,6 +65,7 @@ def export(
     force: bool,
     is_verified: bool,
     requirements: str | None,
+    framework: str | None,
     acceptance_seconds: float | None,
     **options: Any,
 ) -> None:
@@ -76,13 +82,14 @@ def export(
       space-robot export --controller tde_stc --swap 5:ctc --navigation filtered --sensors fine
       space-robot export --robot seven_joint --actuators wheels --law tde_smc --law ctc
       space-robot export --scenario mine.yaml --force
+      space-robot export --framework fprime --law ctc --verify
     """
     from space_robot_msgs_py.config.validation import validate
     from space_robot_msgs_py.errors import FlightError
 
     from ..console.progress import counting_progress
     from ..console.terminal import echo_json
-    from ..export.folder import check_folder, verify, write_folder, write_readme
+    from ..export.folder import check_folder, framework_checks, verify, write_folder, write_readme
     from ..export.software import export as export_software
     from ..export.software import recorded_flights
     from ..flight.compilation import compile_kernels
@@ -100,8 +107,10 @@ def export(
     flights = recorded_flights(plan, exported, laws, acceptance_seconds)
     with counting_progress("recorded flights") as begin:
         advance = begin(len(exported.software.laws) + 2)
-        written = write_folder(out, exported, flights, advance)
+        written = write_folder(out, exported, flights, advance, framework)
     verdicts = list(verify(out)) if is_verified else []
+    checks = framework_checks(out) if is_verified else ()
+    unverified = {name: missing for name, _, missing in checks if missing}
     if verdicts:
         write_readme(out, exported, written, verdicts)
     if as_json:
@@ -112,11 +121,12 @@ def export(
                 **exported.figures(),
                 "flights": [{"name": n, "about": a, "records": count} for n, a, count in written],
                 "verified": [verdict._asdict() for verdict in verdicts],
+                "unverified": unverified,
             }
         )
     else:
         _print_export(out, exported.figures(), written)
-        _print_verdicts(verdicts)
+        _print_verdicts(verdicts, unverified)
     if wrong := [v for v in verdicts if not v.is_accepted]:
         raise FlightError("; ".join(f"{v.target}: {v.reason}" for v in wrong))
 
@@ -137,14 +147,17 @@ def _print_export(
     say(console, f"replay them: make -C {folder}")
 
 
-def _print_verdicts(verdicts: Sequence[ReplayVerdict]) -> None:
-    from ..console.terminal import print_table, terminal
+def _print_verdicts(verdicts: Sequence[ReplayVerdict], unverified: Mapping[str, str]) -> None:
+    from ..console.terminal import print_table, say, terminal
 
     if not verdicts:
         return
     columns = named("target"), Column("states", spec="d"), Column("tick", "ns", ".0f")
     rows = [
-        [v.target, v.states, v.tick_ns, JudgedCell.of(v.is_accepted, "every bit equal", v.reason)]
+        [v.target, v.states, v.tick_ns, JudgedCell.of(v.is_accepted, v.text, v.text)]
         for v in verdicts
     ]
-    print_table(Table.of("Acceptance", [*columns, named("verdict")], rows), terminal())
+    console = terminal()
+    print_table(Table.of("Acceptance", [*columns, named("verdict")], rows), console)
+    for name, missing in unverified.items():
+        say(console, f"{name}: not verified, {missing}")

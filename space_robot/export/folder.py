@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 import shutil
 import subprocess
@@ -10,6 +11,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from space_robot_control.flight_code.folder import Exported
+from space_robot_control.flight_code.frameworks import framework_files
 from space_robot_control.flight_code.instances import write_sources
 from space_robot_msgs_py.errors import InputError
 
@@ -19,6 +21,8 @@ from .software import RecordedFlight
 BUILD_FILES = ("Makefile", "CMakeLists.txt", "misra_deviations.txt", "MISRA.md")
 CROSS = {"aarch64": "aarch64-linux-gnu-gcc", "armhf": "arm-linux-gnueabihf-gcc"}
 EMULATORS = {"aarch64": "qemu-aarch64", "armhf": "qemu-arm"}
+FRAMEWORKS = {"fprime": ("F'", "FPRIME_ROOT"), "cfs": ("cFS", "CFS_ROOT")}
+"""Names of the frameworks, and the environment variables with the folders of their sources."""
 
 
 class ReplayVerdict(NamedTuple):
@@ -37,6 +41,11 @@ class ReplayVerdict(NamedTuple):
     """Bytes on the stack of the function that needs most."""
     reason: str
     """First line that says why it was not accepted."""
+
+    @property
+    def text(self) -> str:
+        """The verdict in words."""
+        return self.reason or ("every bit equal" if self.states else "accepted")
 
 
 def check_folder(folder: Path, force: bool) -> None:
@@ -60,6 +69,7 @@ def write_folder(
     exported: Exported,
     flights: Iterable[RecordedFlight],
     advance: Callable[[], None] = lambda: None,
+    framework: str | None = None,
 ) -> list[tuple[str, str, int]]:
     """Write flight software and recorded flights; replace the folder if it exists.
 
@@ -68,15 +78,19 @@ def write_folder(
         exported: the flight software.
         flights: to be recorded.
         advance: called after each of them.
+        framework: key of `FRAMEWORKS`: its component is written, too.
 
     Returns:
         Name, description and number of records of each flight.
     """
     with atomic_folder(folder.resolve()) as new:
         write_sources(new, exported.sources)
+        if framework:
+            write_sources(new, framework_files(exported, framework))
         acceptance = new / "acceptance"
         acceptance.mkdir()
-        (acceptance / "acceptance.c").write_text(exported.render("acceptance.c"), encoding="utf-8")
+        for file in ("acceptance.c", "recorded.h"):
+            (acceptance / file).write_text(exported.render(file), encoding="utf-8")
         written = []
         for flight in flights:
             flight.recording.write(acceptance / f"{flight.name}.bin")
@@ -95,12 +109,26 @@ def write_readme(
     verdicts: Sequence[ReplayVerdict] = (),
 ) -> None:
     """Write the README, with the verdicts of compilers and processors if there are any."""
-    text = exported.render("README.md", flights=flights, verdicts=verdicts, **exported.figures())
+    content = {"flights": flights, "verdicts": verdicts, **exported.figures()}
+    content["frameworks"] = [name for name in FRAMEWORKS if (folder / name).is_dir()]
+    text = exported.render("README.md", **content)
     (folder / "README.md").write_text(text, encoding="utf-8")
 
 
-def targets() -> dict[str, list[str]]:
-    """Return what can be verified here: the arguments of make by compiler or processor."""
+def framework_checks(folder: Path) -> Iterator[tuple[str, list[str], str]]:
+    """Yield the checks of components: name, arguments of make, and what is missing here."""
+    for framework, (name, variable) in FRAMEWORKS.items():
+        if not (folder / framework).is_dir():
+            continue
+        if framework == "fprime":
+            missing = "" if shutil.which("fpp-check") else "fpp-check is not installed"
+            yield "fpp-check", ["-C", framework, "check"], missing
+        missing = "" if os.environ.get(variable) else f"{variable} is not set"
+        yield name, ["-C", framework, "replay"], missing
+
+
+def targets(folder: Path) -> dict[str, list[str]]:
+    """Return what can be verified here: arguments of make by compiler, processor or framework."""
     here = {}
     for name in filter(shutil.which, ("gcc", "clang")):
         here[name] = [f"COMPILERS={name}", "figures"]
@@ -108,7 +136,8 @@ def targets() -> dict[str, list[str]]:
     for name, compiler in CROSS.items():
         if shutil.which(compiler) and shutil.which(EMULATORS[name]):
             here[name] = [name]
-    return here
+    checks = framework_checks(folder)
+    return here | {name: arguments for name, arguments, missing in checks if not missing}
 
 
 def verify(folder: Path) -> Iterator[ReplayVerdict]:
@@ -117,7 +146,7 @@ def verify(folder: Path) -> Iterator[ReplayVerdict]:
     Raises:
         InputError: there is no compiler, or no make.
     """
-    here = targets()
+    here = targets(folder)
     if not here or not shutil.which("make"):
         raise InputError("no gcc, clang or make was found to verify the folder with")
     for target, arguments in here.items():

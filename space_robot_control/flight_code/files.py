@@ -113,6 +113,8 @@ class Files:
             lang.FieldName(program.records[int(number)], name)
             for number, name in FIELD.findall(self._text)
         }
+        self.used = frozenset(self.fields)
+        """Fields that functions read or write."""
         for record in whole:
             self.fields |= {lang.FieldName(record, name) for name in record.fields()}
         for record, name in list(self.fields):

@@ -47,13 +47,14 @@ class Exported:
             requirements: identifier and text of each that is allocated to it, for the header.
         """
         self.translated: Translated = translate(software)
-        self.software, self.robot, self.requirements = software, robot, requirements
+        self.software, self.requirements = software, requirements
+        self.robot = " ".join(robot.replace("*/", "* /").split())  # it stands in comments
         self._entries = [
             entry for part in software.parts for entry in entries(self.translated, part)
         ]
         text = scenario or "".join(entry.definition for entry in self._entries)
         self.digest = hashlib.sha256(text.encode()).hexdigest()
-        self._templates = jinja2.Environment(
+        self.templates = jinja2.Environment(
             loader=jinja2.PackageLoader(__package__), keep_trailing_newline=True, autoescape=False
         )
 
@@ -109,7 +110,7 @@ class Exported:
             "flags": FLAGS,
             "warnings": WARNINGS,
         }
-        return self._templates.get_template(f"{template}.j2").render(**general, **content)
+        return self.templates.get_template(f"{template}.j2").render(**general, **content)
 
     def figures(self) -> dict[str, Any]:
         """Return what can be counted without a compiler."""

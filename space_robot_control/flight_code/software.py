@@ -72,7 +72,7 @@ class FlightSoftware:
             sources: where numbers come from, by name of the part: ``controller``, or a law's name.
 
         Raises:
-            InputError: a law has no kernel.
+            InputError: a law has no kernel, or a name that C does not allow.
         """
         self.controller, self.laws = controller, list[CompiledLaw]()
         self._supervision, self._sources = supervision, sources
@@ -83,6 +83,11 @@ class FlightSoftware:
                     f"{code.co_filename}, line {code.co_firstlineno}: the law {law.name!r} is a "
                     "Python function and cannot be exported as C: write its equation as the "
                     "`kernel` of a CompiledLaw"
+                )
+            if not (law.name.isidentifier() and law.name.isascii()):
+                raise InputError(
+                    f"the law {law.name!r} cannot be exported as C: a name of letters, digits and "
+                    "underscores was expected"
                 )
             self.laws.append(law)
         self.swaps = [
