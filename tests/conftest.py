@@ -98,6 +98,7 @@ SLOW = (
     "laboratory/campaign/",
     "laboratory/export/",
     "laboratory/paper/",
+    "laboratory/trace/",
     "matrix/",
     "laboratory/cli/test_analyze_and_view.py",
     "laboratory/view/test_in_browser.py",

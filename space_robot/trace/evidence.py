@@ -147,7 +147,8 @@ def _fly_campaign(pieces: Sequence[CampaignEvidence]) -> Iterator[Evidence]:
 
 
 def _test(pieces: Sequence[str]) -> Iterator[Evidence]:
-    code, output, remark = _run("pytest", "--no-header", pieces[0], cwd=ROOT)
+    options = ("--no-header", "-p", "no:cacheprovider")
+    code, output, remark = _run("pytest", *options, pieces[0], cwd=ROOT)
     counts = {word: float(n) for n, word in re.findall(r"(\d+) (passed|failed|error|skip)", output)}
     verdict: EvidenceVerdict = "violated" if code == 1 and counts else "not verified"
     if code == 0 and counts.keys() == {"passed"}:
