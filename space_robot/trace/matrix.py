@@ -5,6 +5,7 @@ from __future__ import annotations
 import datetime
 from collections import Counter
 from collections.abc import Mapping
+from itertools import zip_longest
 from pathlib import Path
 from typing import Any
 
@@ -49,20 +50,19 @@ def matrix_record(
 
 
 def matrix_table(record: dict[str, Any], is_brief: bool = False) -> Table:
-    """Tabulate a `matrix_record`; ``is_brief``: with the columns `BRIEF` only."""
-    rows = record["requirements"]
-    names = BRIEF if is_brief else tuple(rows[0])
-    columns = [Column(name) if name == "measured" else named(name) for name in names]
-    cells = [[_cell(name, row[name]) for name in names] for row in rows]
-    return Table.of(record["title"], columns, cells, record["summary"])
-
-
-def _cell(name: str, value: Any) -> JudgedCell | str | None:
-    if name == "verdict":
-        return JudgedCell("", value, {"violated": "bad", "verified": "good"}.get(value, "open"))
-    if name == "measured":
-        value = "; ".join("-" if number is None else f"{number:.4g}" for number in value)
-    return "; ".join(value) if name == "limits" else str(value or "") or None
+    """Tabulate a `matrix_record`, a row a number; ``is_brief``: with the columns `BRIEF` only."""
+    tones = {"verified": "good", "violated": "bad"}
+    names = BRIEF if is_brief else tuple(record["requirements"][0])
+    columns = [Column(n, spec=".4g") if n == "measured" else named(n) for n in names]
+    rows = []
+    for row in record["requirements"]:
+        verdict = JudgedCell("", row["verdict"], tones.get(row["verdict"], "open"))
+        cells = {**{key: value or None for key, value in row.items()}, "verdict": verdict}
+        for value, limit in [*zip_longest(row["measured"], row["limits"])] or [(None, None)]:
+            cells |= {"measured": value, "limits": limit}
+            rows.append([cells[name] for name in names])
+            cells = dict.fromkeys(row, "")  # further numbers have these two columns alone
+    return Table.of(record["title"], columns, rows, record["summary"])
 
 
 def write_matrix(record: dict[str, Any], folder: Path) -> None:
