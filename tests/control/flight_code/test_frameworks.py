@@ -29,8 +29,8 @@ SCENARIOS: dict[str, dict[str, Any]] = {
 }
 MODEL = PurePosixPath("fprime/SpaceRobotController/SpaceRobotController.fpp")
 HEADER = PurePosixPath("include/space_robot_flight.h")
-PATH = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])
-"""With the programs of this environment, which may not be activated."""
+PATH = os.pathsep.join([os.environ["PATH"], str(Path(sys.executable).parent)])
+"""With the programs of this environment; those of a framework come first."""
 
 needs_fpp = pytest.mark.skipif(
     not shutil.which("fpp-check", path=PATH), reason="fpp-check is not installed"
