@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 import tempfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import NamedTuple
 
@@ -17,6 +17,7 @@ from space_robot_model.hardware.base_actuators import BaseActuatorSettings
 from space_robot_model.robot import Robot
 from space_robot_msgs_py.bag.flight_log import FlightLog, block_bounds
 from space_robot_msgs_py.config.installation import install_command
+from space_robot_msgs_py.config.validation import validate
 from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.samples import Timebase
 from space_robot_msgs_py.telemetry.downlink import Downlink, open_sink, parse_udp
@@ -26,7 +27,8 @@ from space_robot_msgs_py.telemetry.structures import Structures
 from ..console.files import write_text
 from .plan import Flight
 
-EVENT = re.compile(r"(\w+)@([0-9.]+(?:[eE][+-]?[0-9]+)?)")
+DATABASE = ".xml"
+EVENT = re.compile(r"(\w+)@([0-9]*\.?[0-9]+(?:[eE][+-]?[0-9]+)?)")
 """Kind and time at the beginning of a fault or capture as it is written."""
 
 
@@ -62,12 +64,14 @@ class TelemetryPlan(NamedTuple):
         if not {"robot_file", "controller"} <= flown.keys():
             raise InputError("the bag does not tell its robot, so its telemetry has no database")
         robot = Robot.from_dict(flown.get("controller_robot_file", flown["robot_file"]))
-        actuators = BaseActuatorSettings(**flown.get("base_actuators", {}))
+        own = flown.get("base_actuators", {})
+        actuators = validate(BaseActuatorSettings, own, "the bag's base_actuators")
         timebase = Timebase(log.timebase.period_ns)
         structures = telemetry_structures(packets, actuators.robot_names(robot), timebase)
-        scenario = flown.get("scenario", {})
-        laws = {*(law.name for law in log.laws), *scenario.get("gains", {}), flown["controller"]}
-        texts = *flown.get("faults", ()), *flown.get("events", ())
+        laws = {*(law.name for law in log.laws), str(flown["controller"])}
+        with suppress(KeyError, TypeError):  # a bag may hold anything
+            laws |= {*map(str, flown["scenario"]["gains"])}
+        texts = [t for key in ("faults", "events") for t in flown.get(key) or ()]
         return cls(robot, actuators, structures, tuple(laws), _timeline(texts))
 
     @property
@@ -110,11 +114,17 @@ def database_path(destination: str) -> Path:
 
     Beside a file; for UDP in the folder for temporary files, where the ground display of this
     machine looks for it.
+
+    Raises:
+        InputError: there would be one name for both.
     """
     if not destination.startswith("udp:"):
-        return Path(destination).with_suffix(".xml")
+        path = Path(destination)
+        if path.suffix == DATABASE:
+            raise InputError(f"{path}: that is the name of the packets' database: take another")
+        return path.with_suffix(DATABASE)
     _, port = parse_udp(destination)
-    return Path(tempfile.gettempdir()) / f"space_robot_telemetry_{port}.xml"
+    return Path(tempfile.gettempdir()) / f"space_robot_telemetry_{port}{DATABASE}"
 
 
 def prepare_telemetry(flight: Flight) -> Path | None:

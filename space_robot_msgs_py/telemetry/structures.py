@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import AfterValidator, Field
 
+from ..bag.flight_log import MEASURED_APART
 from ..config.validation import StrictModel, one_of, read_yaml, validate
 from ..errors import InputError
 from ..samples import (
@@ -24,7 +25,6 @@ from ..samples import (
     Timebase,
 )
 from ..signals import Each, Signal, signals_of
-from ..topics import STATES
 
 Array = NDArray[np.float64]
 Columns = Callable[[str], Array]
@@ -32,15 +32,8 @@ Columns = Callable[[str], Array]
 Encoding = Literal["float64", "float32", "int32", "int16"]
 
 REFERENCE_PREFIX = "reference_"
-_APART = {
-    name: field.topic
-    for name in ORBIT_FIELDS
-    for field in SIGNALS[name].fields
-    if field.topic in STATES
-}
-"""Topic of each signal of an orbit that a sensor measures."""
 TELEMETERED: dict[str, Signal] = {
-    **{n: signal for n, signal in SIGNALS.items() if n not in ORBIT_FIELDS or n in _APART},
+    **{n: signal for n, signal in SIGNALS.items() if n not in ORBIT_FIELDS or n in MEASURED_APART},
     **{f"{REFERENCE_PREFIX}{name}": signal for name, signal in signals_of(Reference).items()},
     **signals_of(CommandSignals),
     **signals_of(TelemetrySignals),
@@ -49,7 +42,6 @@ TELEMETERED: dict[str, Signal] = {
 UNKNOWN_LAW = 255
 HEADER = [("structure", "u1"), ("tick", ">u4"), ("law", "u1")]
 """Beginning of each packet's data."""
-LAST_TICK = 2**32 - 1
 MOST_BYTES = 60_000
 """Of the data of a packet, so that one fits into a datagram."""
 
@@ -187,7 +179,7 @@ class Structures:
         """Packets are due at multiples of this many ticks."""
 
     def _width(self, signal: str) -> int:
-        if signal in _APART and not getattr(self.names, _APART[signal].of):
+        if signal in MEASURED_APART and not getattr(self.names, MEASURED_APART[signal].of):
             return 0
         return TELEMETERED[signal].width(self.names)
 

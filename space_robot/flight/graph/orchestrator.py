@@ -258,6 +258,7 @@ def launched_parameters(
         ros_parameters: parameters by node that every ROS node has.
     """
     check_bag_path(bag)
+    prepare_telemetry(flight)
     compile_kernels(bool(flight.plant.names.actuators))
     started = {
         node: {**values, "autostart": autostart, **ros_parameters.get(node, {})}

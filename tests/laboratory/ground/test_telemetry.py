@@ -142,6 +142,12 @@ def test_all_signals_fit_one_structure(tmp_path: Path) -> None:
     assert {"twice_quaternion_w"} <= {k for p in packets_in(packets) for k in p}
 
 
+def test_one_name_for_packets_and_database_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"a.xml: that is the name of the packets' database"):
+        Scenario(duration=0.1, telemetry=str(tmp_path / "a.xml")).fly()
+    assert not [*tmp_path.iterdir()]
+
+
 def test_a_bag_without_a_signal_is_refused(tmp_path: Path, space_robot: Any) -> None:
     bag, file = tmp_path / "bag", tmp_path / "laws.yaml"
     Scenario(duration=0.05).fly(bag=bag)
