@@ -62,6 +62,7 @@ class LiveTelemetry:
         """``laws``: names of those that have numbers in telemetry."""
         self._downlink = Downlink(structures, sink)
         self._laws, self._mode = numbers_of_laws(laws), NOMINAL
+        self._every = structures.every
         self._axes = len(structures.names.axes)
 
     @classmethod
@@ -91,6 +92,8 @@ class LiveTelemetry:
         ``change``: the law that is in force from this tick on, if it is another one.
         """
         tick, mode, events = state.tick, supervisor.mode, []
+        if mode == self._mode and not change and tick % self._every:
+            return
         if change:
             number = self._laws.get(change.name, UNKNOWN_LAW)
             events.append(TelemetryEvent(tick, EventKind.LAW_IN_FORCE, number))
@@ -98,8 +101,6 @@ class LiveTelemetry:
             self._mode = mode
             severity = INFORMATION if mode == NOMINAL else HIGH if mode == SAFE else MEDIUM
             events.append(TelemetryEvent(tick, EventKind.MODE_ENTERED, mode, severity))
-        if not (events or self._downlink.is_due(tick)):
-            return
 
         def column(name: str) -> Array:
             if name == "law":

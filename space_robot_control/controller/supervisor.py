@@ -72,6 +72,7 @@ class Supervisor:
         )
         assign(self._record.stamps, longest_jump=longest_jump, last=-1.0, other=-1.0)
         stamps = self.block["stamps"]
+        self._mode: Array = self.block["mode"]
         self._last: Array = stamps["last"]  # read at every tick: faster than from a record
         self._is_new_time: Array = stamps["is_new_time"]
         self._command = Command(-1, self._record.command[: len(controller.names.commanded)])
@@ -81,7 +82,7 @@ class Supervisor:
     @property
     def mode(self) -> int:
         """Mode of the last answer, one of `MODES` by number."""
-        return int(self._record.mode)
+        return int(self._mode[0])
 
     @property
     def reason(self) -> str:

@@ -72,10 +72,6 @@ class Downlink:
         self._counts: dict[tuple[int, int], int] = {}
         """Messages sent of each service and subtype."""
 
-    def is_due(self, tick: int) -> bool:
-        """Return True if a packet may be due at a tick."""
-        return tick % self._structures.every == 0
-
     def send(
         self, start: int, stop: int, columns: Columns, events: Iterable[TelemetryEvent] = ()
     ) -> None:
@@ -85,9 +81,10 @@ class Downlink:
         """
         reports = [(event.tick, 0, event.severity, _event_data(event)) for event in events]
         for each in self._structures.structures:
-            ticks = np.arange(-(-start // each.every) * each.every, stop, each.every)
-            if len(ticks):
-                rows = ticks - start
+            first = -(-start // each.every) * each.every
+            if first < stop:
+                ticks = np.arange(first, stop, each.every)
+                rows = slice(first - start, None, each.every)
                 data = each.encode(ticks, lambda name, rows=rows: columns(name)[rows])  # type: ignore[misc]
                 reports += [
                     (int(tick), each.number, 0, one) for tick, one in zip(ticks, data, strict=True)
