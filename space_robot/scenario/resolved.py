@@ -179,7 +179,9 @@ class ResolvedScenario(FlightSettings):
         robots = self.robots.description
         return {
             **self.brief(plant, robots["robot_file"]),
-            "scenario": {k: v for k, v in self.tree.items() if k not in ("robot", "plant_robot")},
+            "scenario": {
+                k: v for k, v in self.tree.items() if k not in ("robot", "plant_robot", *DOWNLINK)
+            },
             **robots,
         }
 
@@ -238,6 +240,8 @@ SECTIONS: Mapping[str, type[BaseModel]] = {
 START = ("initial_joints_deg", "initial_quaternion", "initial_rate_deg_s")
 """Settings of the plant that its mission holds."""
 SAME_IN_PLANT = ("period", "substeps", "command_latency_ticks")
+DOWNLINK = ("telemetry", "telemetry_packets")
+"""Options that a bag does not have: a flight that is repeated from it writes none."""
 ALWAYS_SHOWN: Mapping[str, Callable[[ResolvedScenario], Any]] = {
     "controller": attrgetter("controller.controller"),
     "gains": _gains,
@@ -263,12 +267,13 @@ SHOWN_IF_SET: Mapping[str, Callable[[ResolvedScenario], Any]] = {
     "swaps": attrgetter("swap_texts"),
     **{name: attrgetter(f"plant.{name}") for name in ("realtime", "paused", "fifo_priority")},
     **{name: attrgetter(f"controller.{name}") for name in ("controller_code", "shadow")},
+    **{name: attrgetter(f"controller.{name}") for name in DOWNLINK},
 }
 """Of options that are left out at their defaults; those not named here are as they were given."""
 HIDDEN = {
     *("friction", "compression", "split_size"),  # in the case, and in the recorder's parameters
     *("namespace", "composed", "domain", "join_timeout"),  # where, and not what, is flown
-    *("telemetry", "telemetry_packets", "telecommands"),
+    "telecommands",
 }
 HELD = {
     *(OPTIONS.keys() - HIDDEN),

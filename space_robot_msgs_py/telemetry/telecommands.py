@@ -31,7 +31,7 @@ class FailureCode(IntEnum):
     NO_ANSWER = 7
 
 
-class RefusedTelecommand(SpaceRobotError):  # noqa: N818
+class TelecommandError(SpaceRobotError):
     """A telecommand that is not executed."""
 
     def __init__(self, code: FailureCode, why: str) -> None:
@@ -103,24 +103,24 @@ def read_telecommand(packet: Any, apid: int, known: Sequence[TcFunction]) -> Tel
     """Return what a packet (`spacepackets.ecss.PusTc`) asks for.
 
     Raises:
-        RefusedTelecommand: it cannot be executed.
+        TelecommandError: it cannot be executed.
     """
     code = FailureCode
     if packet.apid != apid:
-        raise RefusedTelecommand(code.UNKNOWN_APID, f"APID {packet.apid}: {apid} was expected")
+        raise TelecommandError(code.UNKNOWN_APID, f"APID {packet.apid}: {apid} was expected")
     service = packet.service, packet.message_subtype
     if service != (FUNCTION_MANAGEMENT, PERFORM):
         why = f"service {service[0]}, subtype {service[1]}: 8, 1 was expected"
-        raise RefusedTelecommand(code.UNKNOWN_SERVICE, why)
+        raise TelecommandError(code.UNKNOWN_SERVICE, why)
     data = bytes(packet.app_data)
     by_number = {function.number: function for function in known}
     if not data or data[0] not in by_number:
         why = f"function {data[0] if data else 'missing'}: 1 to {len(known)} were expected"
-        raise RefusedTelecommand(code.UNKNOWN_FUNCTION, why)
+        raise TelecommandError(code.UNKNOWN_FUNCTION, why)
     function = by_number[data[0]]
     if len(data) - 1 != function.layout.size:
         why = f"{function.name}: {len(data) - 1} octets of arguments, {function.layout.size} were "
-        raise RefusedTelecommand(code.WRONG_LENGTH, f"{why}expected")
+        raise TelecommandError(code.WRONG_LENGTH, f"{why}expected")
     values = zip(function.arguments, function.layout.unpack(data[1:]), strict=True)
     return Telecommand(function.name, {a.name: _value(a, value) for a, value in values})
 
@@ -131,16 +131,16 @@ def _value(argument: TcArgument, value: Any) -> Any:
             return bytes(value).rstrip(b"\0").decode("ascii")
         except UnicodeDecodeError:
             why = f"{argument.name}: ASCII was expected"
-            raise RefusedTelecommand(FailureCode.WRONG_ARGUMENT, why) from None
+            raise TelecommandError(FailureCode.WRONG_ARGUMENT, why) from None
     if argument.choices:
         for name, number in argument.choices.items():
             if number == value:
                 return name
         why = f"{argument.name} {value}: one of {', '.join(map(str, argument.choices.values()))}"
-        raise RefusedTelecommand(FailureCode.WRONG_ARGUMENT, why)
+        raise TelecommandError(FailureCode.WRONG_ARGUMENT, why)
     if not abs(value) < 1e9:
         why = f"{argument.name} {value}: a finite number was expected"
-        raise RefusedTelecommand(FailureCode.WRONG_ARGUMENT, why)
+        raise TelecommandError(FailureCode.WRONG_ARGUMENT, why)
     return value
 
 

@@ -33,6 +33,8 @@ NO_FLIGHT_S_OWN = {
     "controller_code": "the cell c",
     "shadow": "the cell c",
     "navigation_sensors": "sensors that are assumed are those that fly",
+    "telemetry": "tests/laboratory/ground",
+    "telemetry_packets": "tests/laboratory/ground",
 }
 OF_THE_GRAPH = {
     *("period", "fifo_priority", "ticks", "realtime", "paused", "reset_with", "own_controller"),

@@ -32,6 +32,7 @@ from space_robot_msgs_py.errors import (
 from space_robot_msgs_py.ros.locks import HeldError, Holder
 from space_robot_msgs_py.samples import RobotNames, Timebase
 from space_robot_msgs_py.simulated_time import LATEST_S, check_time, shortest, tick_from
+from space_robot_msgs_py.telemetry.telecommands import FailureCode, TelecommandError
 from space_robot_msgs_py.wire.messages import describe
 
 OVERRIDES = CONFIG / "qos/record_overrides.yaml"
@@ -87,6 +88,7 @@ MADE: dict[type[SpaceRobotError], SpaceRobotError] = {
     MessageError: MessageError("text", "late"),
     NotInSubsetError: NotInSubsetError("law.py", 12, "recursion", "write a loop"),
     HeldError: HeldError(Path("lock"), Holder("plant (pid 1)", 2)),
+    TelecommandError: TelecommandError(FailureCode.REFUSED, "why"),
     InterruptedFlightError: InterruptedFlightError("stopped", 2),
 }
 """Those whose constructors want more than a text."""

@@ -17,9 +17,9 @@ from space_robot_msgs_py.errors import FlightError, InputError
 from space_robot_msgs_py.telemetry.downlink import LOOPBACK, cuc_time, parse_udp
 from space_robot_msgs_py.telemetry.telecommands import (
     FailureCode,
-    RefusedTelecommand,
     TcFunction,
     Telecommand,
+    TelecommandError,
     functions,
     read_telecommand,
 )
@@ -126,7 +126,7 @@ class TelecommandLink:
 
         try:
             command = read_telecommand(packet, self._apid, self._functions)
-        except RefusedTelecommand as error:
+        except TelecommandError as error:
             self._refuse(str(error))
             report(NOT_ACCEPTED, error.code)
             return

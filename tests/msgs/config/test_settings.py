@@ -30,6 +30,7 @@ from space_robot_msgs_py.errors import InputError
 from space_robot_sim.plant.settings import PlantNodeSettings
 
 SCHEMAS = (PlantNodeSettings, ControllerNodeSettings, MissionNodeSettings, RecorderNodeSettings)
+OTHERS = ("campaigns", "qos", "requirements", "robots", "targets", "telemetry")
 NO_PARAMETERS = ("default_sets.yaml", "ideal.yaml")
 """Files that name sets, or have nothing to say."""
 
@@ -43,7 +44,7 @@ def test_every_setting_has_a_description() -> None:
 def test_every_shipped_parameter_file_is_one() -> None:
     for path in config_directory().rglob("*.yaml"):
         if (
-            path.parent.name in ("campaigns", "robots", "qos", "targets")
+            path.parent.name in OTHERS
             or path.name in NO_PARAMETERS
             or "mission" in yaml.safe_load(path.read_text())  # a document
         ):
