@@ -67,6 +67,8 @@ def test_start_up_in_any_order(
     ground.until(lambda: "plant_node" in ground.monitor.modes, "the plant")
     controller = start("controller", wait_for=wait_for("controller"))
     ground.until(lambda: "controller_node" in ground.monitor.modes, "the controller")
+    markers_out = topics.MARKERS.full_name
+    ground.until(lambda: ground.node.count_publishers(markers_out) > 0, "the markers")
     mission = start("mission", wait_for=wait_for("mission"))
     recorder = start("recorder", bag=tmp_path / "bag")
     output, _ = plant.communicate(timeout=90)
