@@ -6,6 +6,7 @@ import gc
 import json
 import os
 import signal
+import socket
 import sys
 from collections.abc import Callable, Iterable, Iterator, MutableMapping
 from pathlib import Path
@@ -192,6 +193,14 @@ def domain(monkeypatch: pytest.MonkeyPatch) -> Iterator[int]:
     monkeypatch.delenv("ROS_DOMAIN_ID", raising=False)
     with ros_domain() as number:
         yield number
+
+
+@pytest.fixture
+def udp_port() -> int:
+    """A UDP port of this machine that nobody has."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])
 
 
 @pytest.fixture(scope="session")

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import click
 
 from .options import excerpt_options
+from .telemetry import PACKETS
 
 if TYPE_CHECKING:
     from space_robot_msgs_py.bag.flight_log import FlightLog
@@ -31,13 +32,7 @@ if TYPE_CHECKING:
     type=click.Path(path_type=Path, dir_okay=False),
     help="XTCE file of the telemetry [default: that of the flight that sends to the port].",
 )
-@click.option(
-    "--packets",
-    default="housekeeping",
-    show_default=True,
-    metavar="NAME-or-FILE",
-    help="Packets of a BAG: a name of config/telemetry, or a path to a YAML file.",
-)
+@PACKETS
 @click.option(
     "--port",
     type=click.IntRange(0, 65535),
@@ -71,23 +66,22 @@ def ground(
     import asyncio
     from tempfile import TemporaryDirectory
 
-    from space_robot_msgs_py.errors import InputError
-
-    try:
-        from ..ground.server import GroundServer, find_openmct
-    except ImportError as error:
-        from space_robot_msgs_py.config.installation import install_command
-
-        raise InputError(f"ground needs {error.name}: `{install_command('ground')}`") from None
-    from ..flight.telemetry import database_path
+    from ..flight.telemetry import TelemetryPlan, check_libraries, database_path
     from ..processes.interruption import Interrupted
+
+    check_libraries("aiohttp", "lxml", "space_packet_parser")
+    from ..ground.server import GroundServer, find_openmct
 
     openmct = find_openmct()
     with TemporaryDirectory() as folder:
         if bag:
             database = Path(folder) / "telemetry.xml"
             server = GroundServer(openmct, database, is_live=False)
-            _fill(server, database, read(bag), packets)
+            log = read(bag)
+            plan = TelemetryPlan.of_log(log, packets)
+            database.write_text(plan.database, "utf-8")
+            for packet in plan.packets(log):
+                server.receive(packet)
         else:
             database = database or database_path(f"udp:127.0.0.1:{udp}")
             server = GroundServer(openmct, database, is_live=True)
@@ -95,24 +89,6 @@ def ground(
         asyncio.run(_serve(server, port, udp, opens))
     except Interrupted:
         click.echo("ended", err=True)
-
-
-def _fill(server: GroundServer, database: Path, log: FlightLog, packets: str) -> None:
-    """Give a server the packets of a log, as a receiver would have got them."""
-    from space_packet_parser.generators.ccsds import ccsds_generator
-
-    from space_robot_msgs_py.telemetry.downlink import Downlink, open_sink
-
-    from ..flight.telemetry import TelemetryPlan
-
-    plan, file = TelemetryPlan.of_log(log, packets), database.with_name("packets")
-    database.write_text(plan.database, "utf-8")
-    downlink = Downlink(plan.structures, open_sink(str(file)))
-    plan.send(downlink, log)
-    downlink.close()
-    with file.open("rb") as stream:
-        for packet in ccsds_generator(stream):
-            server.receive(bytes(packet))
 
 
 async def _serve(server: GroundServer, port: int, udp: int, opens: bool) -> None:

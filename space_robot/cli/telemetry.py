@@ -29,6 +29,16 @@ def _list_signals(context: click.Context, option: click.Parameter, is_asked: boo
     context.exit()
 
 
+PACKETS = click.option(
+    "--packets",
+    default="housekeeping",
+    show_default=True,
+    metavar="NAME-or-FILE",
+    shell_complete=names_in("telemetry", ["housekeeping"]),
+    help="What the packets of a BAG have: a name of config/telemetry, or a path to a YAML file.",
+)
+
+
 @click.command()
 @click.argument("bag", type=click.Path(path_type=Path))
 @click.option(
@@ -38,14 +48,7 @@ def _list_signals(context: click.Context, option: click.Parameter, is_asked: boo
     metavar="DESTINATION",
     help="A file, or udp:HOST:PORT [default: <BAG>.packets, here].",
 )
-@click.option(
-    "--packets",
-    default="housekeeping",
-    show_default=True,
-    metavar="NAME-or-FILE",
-    shell_complete=names_in("telemetry", ["housekeeping"]),
-    help="What the packets have: a name of config/telemetry, or a path to a YAML file.",
-)
+@PACKETS
 @click.option(
     "--signals",
     is_flag=True,
@@ -74,7 +77,7 @@ def telemetry(
       space-robot simulate --telemetry live.packets
       space-robot telemetry --signals
     """
-    from space_robot_msgs_py.telemetry.downlink import Downlink, FileSink, open_sink
+    from space_robot_msgs_py.telemetry.downlink import open_sink
 
     from ..console.files import atomic_file, write_text
     from ..console.terminal import echo_json
@@ -84,16 +87,15 @@ def telemetry(
     log = read(bag)
     plan = TelemetryPlan.of_log(log, packets)
     database, path = plan.database, database_path(destination)
+    written = [*plan.packets(log)]
     if destination.startswith("udp:"):
-        downlink = Downlink(plan.structures, open_sink(destination))
-        plan.send(downlink, log)
+        open_sink(destination).writelines(written)
     else:
         with atomic_file(Path(destination), replace=True) as file:
-            downlink = Downlink(plan.structures, FileSink(file))
-            plan.send(downlink, log)
+            file.writelines(written)
     write_text(database, path, replace=True)
-    report = {"packets": downlink.sent, "destination": destination, "database": str(path)}
+    report = {"packets": len(written), "destination": destination, "database": str(path)}
     if as_json:
         echo_json(report)
     else:
-        click.echo(f"{destination}: {downlink.sent} packets; database: {path}")
+        click.echo(f"{destination}: {len(written)} packets; database: {path}")

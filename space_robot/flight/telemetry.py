@@ -6,6 +6,7 @@ import re
 import tempfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
+from importlib import import_module
 from pathlib import Path
 from typing import NamedTuple
 
@@ -13,6 +14,7 @@ import numpy as np
 
 from space_robot_control.controller.live_telemetry import LiveTelemetry, telemetry_structures
 from space_robot_control.controller.supervisor import Report
+from space_robot_control.controller.tick import MODES
 from space_robot_model.hardware.base_actuators import BaseActuatorSettings
 from space_robot_model.robot import Robot
 from space_robot_msgs_py.bag.flight_log import FlightLog, block_bounds
@@ -20,7 +22,7 @@ from space_robot_msgs_py.config.installation import install_command
 from space_robot_msgs_py.config.validation import validate
 from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.samples import Timebase
-from space_robot_msgs_py.telemetry.downlink import Downlink, open_sink, parse_udp
+from space_robot_msgs_py.telemetry.downlink import PacketWriter, open_sink, parse_udp
 from space_robot_msgs_py.telemetry.recorded import log_columns, log_events
 from space_robot_msgs_py.telemetry.structures import Structures
 
@@ -85,28 +87,30 @@ class TelemetryPlan(NamedTuple):
         from space_robot_msgs_py.telemetry.database import database
 
         limits = signal_limits(self.robot, self.actuators)
-        return database(self.robot.name, self.structures, self.laws, limits, self.timeline)
+        laws, structures = self.laws, self.structures
+        return database(self.robot.name, structures, laws, MODES, limits, self.timeline)
 
-    def send(self, downlink: Downlink, log: FlightLog) -> None:
-        """Write the packets of a log, or of a part of it."""
+    def packets(self, log: FlightLog, writer: PacketWriter | None = None) -> Iterator[bytes]:
+        """Yield the packets of a log, or of a part of it with the ``writer`` of the part before."""
+        writer = writer or PacketWriter(self.structures)
         for start, stop in block_bounds(log.ticks):
             rows = log.rows(start, stop)
             columns, first = log_columns(rows, self.laws), rows.first_tick
-            downlink.send(first, first + rows.ticks, columns, log_events(rows, self.laws))
+            events = log_events(rows, self.laws)
+            yield from writer.packets(first, first + rows.ticks, columns, events)
 
 
-def check_libraries() -> None:
-    """Check that the libraries of the extra ``ground`` are installed.
+def check_libraries(*others: str) -> None:
+    """Check that what writes packets and databases is installed, and modules of ``others``.
 
     Raises:
         InputError: one is not.
     """
     try:
-        import spacepackets
-        import yamcs.pymdb  # noqa: F401
+        for module in ("spacepackets", "yamcs.pymdb", *others):
+            import_module(module)
     except ImportError as error:
         raise InputError(f"telemetry needs {error.name}: `{install_command('ground')}`") from None
-    del spacepackets
 
 
 def database_path(destination: str) -> Path:
@@ -161,11 +165,11 @@ def telemetry_of(flight: Flight) -> Iterator[Callable[[FlightLog], None]]:
         yield lambda log: None
         return
     plan = TelemetryPlan.of_flight(flight)
-    downlink = Downlink(plan.structures, open_sink(flight.controller_settings.telemetry))
+    writer, sink = PacketWriter(plan.structures), open_sink(flight.controller_settings.telemetry)
     try:
-        yield lambda log: plan.send(downlink, log)
+        yield lambda log: sink.writelines([*plan.packets(log, writer)])
     finally:
-        downlink.close()
+        sink.close()
 
 
 @contextmanager

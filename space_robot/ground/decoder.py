@@ -8,10 +8,13 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from space_robot_msgs_py.config.installation import install_command
-from space_robot_msgs_py.errors import InputError
+from lxml import etree
+from space_packet_parser.xtce.definitions import XtcePacketDefinition
 
-ROOT_CONTAINER, EVENT = "telemetry_packet", "event"
+from space_robot_msgs_py.errors import InputError
+from space_robot_msgs_py.telemetry.structures import ROOT_CONTAINER
+
+EVENT_PACKET = "event"
 LEVELS = {"WarningRange": "amber", "CriticalRange": "red"}
 
 
@@ -34,13 +37,6 @@ class Decoder:
         Raises:
             InputError: it is missing, no XTCE, or not one of this kind.
         """
-        try:
-            from lxml import etree
-            from space_packet_parser.xtce.definitions import XtcePacketDefinition
-        except ImportError as error:
-            raise InputError(
-                f"the ground needs {error.name}: `{install_command('ground')}`"
-            ) from None
         try:
             self._definition = XtcePacketDefinition.from_xtce(
                 path, root_container_name=ROOT_CONTAINER
@@ -68,7 +64,7 @@ class Decoder:
             return None
         del values["checksum"]
         number = values.pop("structure", None)
-        container = EVENT if number is None else self._names[int(number)]
+        container = EVENT_PACKET if number is None else self._names[int(number)]
         return Packet(float(parsed["time"]), container, values)
 
     @cached_property

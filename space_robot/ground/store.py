@@ -7,7 +7,7 @@ from collections import defaultdict
 from collections.abc import Iterable
 from typing import Any
 
-from .decoder import EVENT, Packet
+from .decoder import EVENT_PACKET, Packet
 
 MOST_VALUES = 1_000_000
 """Values kept of a parameter; the oldest go first."""
@@ -40,7 +40,7 @@ class TelemetryStore:
         while self._planned and self._planned[0][0] <= packet.time_s:
             time_s, text = self._planned.pop(0)
             self.events.append({"time": time_s, "text": text, "level": "warning"})
-        if packet.container == EVENT:
+        if packet.container == EVENT_PACKET:
             self.events.append(event_of(packet))
             return
         for name, value in packet.values.items():

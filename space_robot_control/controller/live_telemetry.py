@@ -21,8 +21,8 @@ from space_robot_msgs_py.samples import (
 )
 from space_robot_msgs_py.signals import signals_of
 from space_robot_msgs_py.telemetry.downlink import (
-    Downlink,
     EventKind,
+    PacketWriter,
     Sink,
     TelemetryEvent,
     open_sink,
@@ -60,7 +60,7 @@ class LiveTelemetry:
 
     def __init__(self, structures: Structures, sink: Sink, laws: Sequence[str]) -> None:
         """``laws``: names of those that have numbers in telemetry."""
-        self._downlink = Downlink(structures, sink)
+        self._writer, self._sink = PacketWriter(structures), sink
         self._laws, self._mode = numbers_of_laws(laws), NOMINAL
         self._every = structures.every
         self._axes = len(structures.names.axes)
@@ -114,8 +114,8 @@ class LiveTelemetry:
             both = torque[np.newaxis]
             return both[:, : self._axes] if name == "commanded_torque" else both[:, self._axes :]
 
-        self._downlink.send(tick, tick + 1, column, events)
+        self._sink.writelines(self._writer.packets(tick, tick + 1, column, events))
 
     def close(self) -> None:
         """Close the destination."""
-        self._downlink.close()
+        self._sink.close()

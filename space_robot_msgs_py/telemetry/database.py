@@ -8,7 +8,14 @@ from typing import Any
 import yamcs.pymdb as xtce
 
 from .downlink import EVENT_REPORTING, HOUSEKEEPING, PARAMETER_REPORT, EventKind
-from .structures import UNKNOWN_LAW, Structures, TmParameter, identifier, numbers_of_laws
+from .structures import (
+    ROOT_CONTAINER,
+    UNKNOWN_LAW,
+    Structures,
+    TmParameter,
+    identifier,
+    numbers_of_laws,
+)
 from .telecommands import FUNCTION_MANAGEMENT, PERFORM, TcArgument, functions
 
 Limits = Mapping[str, Sequence[tuple[float, float]]]
@@ -36,8 +43,6 @@ SECONDARY = {
 }
 """Bits of the fields of a telemetry packet's secondary header (ECSS-E-ST-70-41C) up to the time."""
 TIME_BITS, TIME_COUNT_S = 56, 2.0**-24
-MODE_NAMES = ("nominal", "holding", "safe")
-ROOT_CONTAINER = "telemetry_packet"
 ENCODINGS = {
     "float64": xtce.float64_t,
     "float32": xtce.float32_t,
@@ -50,6 +55,7 @@ def database(
     robot: str,
     structures: Structures,
     laws: Sequence[str],
+    modes: Sequence[str],
     limits: Limits,
     timeline: Iterable[tuple[float, str]] = (),
 ) -> str:
@@ -59,6 +65,7 @@ def database(
         robot: name of the robot.
         structures: of its telemetry.
         laws: names of its control laws.
+        modes: names of the controller's modes, by number.
         limits: of signals; values are red beyond them, amber from `AMBER` of them on.
         timeline: planned events of the flight as time, s, and text, for displays: captures, faults,
             swaps.
@@ -66,14 +73,19 @@ def database(
     events = {f"event {k}": f"{time_s!r} {text}" for k, (time_s, text) in enumerate(timeline)}
     about = f"space_robot: robot {robot}"
     system = xtce.System(identifier(robot), short_description=about, extra=events)
-    _Telemetry(system, structures, laws, limits)
+    _Telemetry(system, structures, laws, modes, limits)
     _add_commands(system, structures, laws)
     return str(system.dumps())
 
 
 class _Telemetry:
     def __init__(
-        self, system: Any, structures: Structures, laws: Sequence[str], limits: Limits
+        self,
+        system: Any,
+        structures: Structures,
+        laws: Sequence[str],
+        modes: Sequence[str],
+        limits: Limits,
     ) -> None:
         self._system, self._limits = system, limits
         self._checksum = self._integer("checksum", 16)
@@ -121,7 +133,7 @@ class _Telemetry:
             encoding=xtce.uint8_t,
         )
         mode = xtce.EnumeratedParameter(
-            system, "mode", list(enumerate(MODE_NAMES)), encoding=xtce.uint8_t
+            system, "mode", list(enumerate(modes)), encoding=xtce.uint8_t
         )
         events = self._container(
             "events",

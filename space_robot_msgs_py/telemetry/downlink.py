@@ -9,7 +9,7 @@ from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from enum import IntEnum
 from pathlib import Path
-from typing import IO, NamedTuple, Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
@@ -52,30 +52,30 @@ def cuc_time(stamp_ns: int) -> bytes:
 
 
 class Sink(Protocol):
-    """Destination of packets."""
+    """Destination of packets; a file that is open for octets is one."""
 
-    def write(self, packets: Sequence[bytes]) -> None:
+    def writelines(self, packets: Sequence[bytes], /) -> None:
         """Write packets in order."""
 
     def close(self) -> None:
         """Write what is buffered, and close."""
 
 
-class Downlink:
-    """Writes the packets of a flight in the order of their ticks."""
+class PacketWriter:
+    """Makes the packets of a robot, in the order of their ticks and numbered."""
 
-    def __init__(self, structures: Structures, sink: Sink) -> None:
-        """``sink``: where packets go; closed with the downlink."""
-        self._structures, self._sink = structures, sink
-        self.sent = 0
-        """Number of packets."""
+    def __init__(self, structures: Structures) -> None:
+        """``structures``: of the housekeeping packets."""
+        self._structures = structures
+        self.count = 0
+        """Number of packets made."""
         self._counts: dict[tuple[int, int], int] = {}
         """Messages sent of each service and subtype."""
 
-    def send(
+    def packets(
         self, start: int, stop: int, columns: Columns, events: Iterable[TelemetryEvent] = ()
-    ) -> None:
-        """Write the packets of the ticks ``start`` to before ``stop``.
+    ) -> list[bytes]:
+        """Return the packets of the ticks ``start`` to before ``stop``.
 
         ``columns`` returns a signal's values (stop - start, ...), a row a tick.
         """
@@ -94,15 +94,11 @@ class Downlink:
             service, subtype = (
                 (HOUSEKEEPING, PARAMETER_REPORT) if number else (EVENT_REPORTING, severity)
             )
-            packets.append(self._packet(tick, service, subtype, content))
-        if packets:
-            self._sink.write(packets)
+            packets.append(self.packet(tick, service, subtype, content))
+        return packets
 
-    def close(self) -> None:
-        """Close the sink."""
-        self._sink.close()
-
-    def _packet(self, tick: int, service: int, subtype: int, data: bytes) -> bytes:
+    def packet(self, tick: int, service: int, subtype: int, data: bytes) -> bytes:
+        """Return a packet of a service with some data."""
         from spacepackets.ecss.tm import PusTm
 
         count = self._counts.get((service, subtype), 0)
@@ -112,11 +108,11 @@ class Downlink:
             timestamp=cuc_time(self._structures.timebase.stamp_ns(tick)),
             source_data=data,
             apid=self._structures.apid,
-            seq_count=self.sent % 2**14,
+            seq_count=self.count % 2**14,
             message_counter=count,
         )
         self._counts[service, subtype] = (count + 1) % 2**16
-        self.sent += 1
+        self.count += 1
         return bytes(packet.pack())
 
 
@@ -135,7 +131,7 @@ class UdpSink:
         except OSError as error:
             raise InputError(f"udp:{host}:{port}: {error.strerror or error}") from None
 
-    def write(self, packets: Sequence[bytes]) -> None:
+    def writelines(self, packets: Sequence[bytes], /) -> None:
         """Send packets, with pauses in which the receiver can read them."""
         for number, packet in enumerate(packets, 1):
             with suppress(OSError):  # nobody listens
@@ -146,22 +142,6 @@ class UdpSink:
     def close(self) -> None:
         """Close the socket."""
         self._socket.close()
-
-
-class FileSink:
-    """A file of packets, one behind the other."""
-
-    def __init__(self, file: IO[bytes]) -> None:
-        """Write to an open file, which is closed with the sink."""
-        self._file = file
-
-    def write(self, packets: Sequence[bytes]) -> None:
-        """Append packets."""
-        self._file.writelines(packets)
-
-    def close(self) -> None:
-        """Close the file."""
-        self._file.close()
 
 
 def parse_udp(address: str) -> tuple[str, int]:
@@ -186,6 +166,6 @@ def open_sink(destination: str) -> Sink:
     if destination.startswith("udp:"):
         return UdpSink(*parse_udp(destination))
     try:
-        return FileSink(Path(destination).open("ab"))
+        return Path(destination).open("ab")
     except OSError as error:
         raise InputError(f"{destination}: {error.strerror}") from None

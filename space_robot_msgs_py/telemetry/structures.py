@@ -39,6 +39,8 @@ TELEMETERED: dict[str, Signal] = {
     **signals_of(TelemetrySignals),
 }
 """Signals that a packet may have: measured states, reference, command, telemetry of the law."""
+ROOT_CONTAINER = "telemetry_packet"
+"""Container of all packets in a database."""
 UNKNOWN_LAW = 255
 HEADER = [("structure", "u1"), ("tick", ">u4"), ("law", "u1")]
 """Beginning of each packet's data."""

@@ -219,8 +219,13 @@ def go_to(segment: str, domain: int | None, namespace: str) -> None:
     """
     service = f"{MISSION}/set_parameters_atomically"
     with _caller("goto", service, domain, namespace) as (node, check):
-        # a text of its own: the mission ignores one that it has had
-        set_parameters(node, MISSION, {"goto": f"{segment} # {uuid.uuid4()}"}, check)
+        send_segment(node, segment, check)
+
+
+def send_segment(node: Any, segment: str, check: Check) -> None:
+    """Have a mission fly a segment, see `go_to`; ``node`` is in its graph."""
+    # a text of its own: the mission ignores one that it has had
+    set_parameters(node, MISSION, {"goto": f"{segment} # {uuid.uuid4()}"}, check)
 
 
 @contextmanager

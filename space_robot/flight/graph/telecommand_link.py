@@ -6,7 +6,6 @@ import json
 import socket
 import struct
 import threading
-import uuid
 from collections import Counter
 from contextlib import suppress
 from typing import Any
@@ -14,7 +13,7 @@ from typing import Any
 from typing_extensions import Self
 
 from space_robot_msgs_py.errors import FlightError, InputError
-from space_robot_msgs_py.telemetry.downlink import LOOPBACK, cuc_time, parse_udp
+from space_robot_msgs_py.telemetry.downlink import LOOPBACK, PacketWriter, parse_udp
 from space_robot_msgs_py.telemetry.telecommands import (
     FailureCode,
     TcFunction,
@@ -26,8 +25,8 @@ from space_robot_msgs_py.telemetry.telecommands import (
 
 from ..plan import Flight
 from ..telemetry import TelemetryPlan, check_libraries
-from .node_names import CONTROLLER_NODE, MISSION, PLANT
-from .node_services import TemporaryNode, call_trigger, set_parameters
+from .node_names import CONTROLLER_NODE, PLANT
+from .node_services import TemporaryNode, call_trigger, send_segment, set_parameters
 
 LOOK_S = 0.2
 """The end is looked for this often, s."""
@@ -57,9 +56,8 @@ class TelecommandLink:
         if host not in (LOOPBACK, "localhost"):
             raise InputError(f"telecommands are received at {LOOPBACK} only, got {host!r}")
         plan = TelemetryPlan.of_flight(flight)
-        self._apid = plan.structures.apid
+        self._apid, self._writer = plan.structures.apid, PacketWriter(plan.structures)
         self._functions: tuple[TcFunction, ...] = functions(plan.structures.names, plan.laws)
-        self._joints = plan.structures.names.joints
         self._to_degrees = plan.robot.to_degrees
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         try:
@@ -72,7 +70,7 @@ class TelecommandLink:
         """Packets by what became of them: executed, refused, damaged."""
         self.refusals: list[str] = []
         """Reasons, at most `MOST_KEPT`."""
-        self._is_over, self._sent = threading.Event(), 0
+        self._is_over = threading.Event()
         self._thread: threading.Thread | None = None
 
     def begin(self, domain: int, namespace: str) -> None:
@@ -161,9 +159,7 @@ class TelecommandLink:
             else:
                 positions = [v for key, v in values.items() if key != "duration"]
                 segment["joints_deg"] = [float(v) for v in self._to_degrees(positions)]
-            # a text of its own: the mission ignores one that it has had
-            text = f"{json.dumps(segment)} # {uuid.uuid4()}"
-            set_parameters(node, MISSION, {"goto": text}, self._check)
+            send_segment(node, json.dumps(segment), self._check)
 
     def _refuse(self, why: str) -> None:
         self.counts["refused"] += 1
@@ -175,16 +171,6 @@ class TelecommandLink:
             raise FlightError("no answer: the flight is over")
 
     def _report(self, receiver: Any, subtype: int, data: bytes) -> None:
-        from spacepackets.ecss.tm import PusTm
-
-        packet = PusTm(
-            service=VERIFICATION,
-            message_subtype=subtype,
-            timestamp=cuc_time(0),
-            source_data=data,
-            apid=self._apid,
-            seq_count=self._sent % 2**14,
-        )
-        self._sent += 1
+        packet = self._writer.packet(0, VERIFICATION, subtype, data)
         with suppress(OSError):  # the sender has gone
-            self._socket.sendto(bytes(packet.pack()), receiver)
+            self._socket.sendto(packet, receiver)

@@ -8,6 +8,7 @@ import shutil
 import socket
 import sys
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -150,6 +151,22 @@ JUDGED = """(async () => {
 })()"""
 
 
+@contextmanager
+def displayed(browser: Any, *arguments: str) -> Iterator[Any]:
+    """A tab with what ``space-robot ground`` shows, which ends with the context."""
+    process = forked_space_robot("ground", *arguments, "--no-open", "--port", "0")
+    try:
+        assert process.stderr
+        address = re.search(r"http://\S+/", process.stderr.readline())
+        assert address
+        tab = browser.tab(1400, 900)
+        tab.open(address[0])
+        yield tab
+    finally:
+        process.kill()
+        process.communicate(60.0)
+
+
 def shown(tab: Any) -> None:
     """Wait until the flight's display has curves and its events."""
     tab.wait("document.querySelectorAll('.c-plot canvas').length > 3")
@@ -161,13 +178,7 @@ def shown(tab: Any) -> None:
 def test_open_mct_shows_a_bag(browser: Any, tmp_path: Path) -> None:
     bag = tmp_path / "bag"
     log = Scenario(duration=1.0, actuators="wheels", swaps=["0.5:ctc"]).fly(bag=bag).log
-    process = forked_space_robot("ground", str(bag), "--no-open", "--port", "0")
-    try:
-        assert process.stderr
-        address = re.search(r"http://\S+/", process.stderr.readline())
-        assert address
-        tab = browser.tab(1400, 900)
-        tab.open(address[0])
+    with displayed(browser, str(bag)) as tab:
         shown(tab)
         values = tab.value(f"(async () => {VALUES})()")
         assert [value["value"] for value in values] == log.omega_base[::200, 0].tolist()
@@ -176,24 +187,12 @@ def test_open_mct_shows_a_bag(browser: Any, tmp_path: Path) -> None:
             "is-limit--yellow is-limit--upr",
             "is-limit--red is-limit--lwr",
         ]
-    finally:
-        process.kill()
-        process.communicate(60.0)
 
 
-def test_open_mct_follows_a_flight(browser: Any, tmp_path: Path) -> None:
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-        probe.bind(("127.0.0.1", 0))
-        port = probe.getsockname()[1]
-    process = forked_space_robot("ground", "--no-open", "--port", "0", "--udp", str(port))
-    try:
-        assert process.stderr
-        address = re.search(r"http://\S+/", process.stderr.readline())
-        assert address
-        tab = browser.tab(1400, 900)
-        tab.open(address[0])
+def test_open_mct_follows_a_flight(browser: Any, udp_port: int) -> None:
+    with displayed(browser, "--udp", str(udp_port)) as tab:
         tab.wait("document.body.innerText.includes('No flight yet')")
-        options: dict[str, Any] = {"actuators": "wheels", "telemetry": f"udp:127.0.0.1:{port}"}
+        options: dict[str, Any] = {"actuators": "wheels", "telemetry": f"udp:127.0.0.1:{udp_port}"}
         Scenario(duration=0.2, **options).fly()  # its database makes the page load anew
         shown(tab)
         log = Scenario(duration=1.0, **options).fly().log
@@ -203,6 +202,3 @@ def test_open_mct_follows_a_flight(browser: Any, tmp_path: Path) -> None:
         assert [value["value"] for value in values] == log.omega_base[::200, 0].tolist()
         last = tab.value("openmct.time.getClock().currentValue() - Date.UTC(2000, 0, 1)")
         assert last == pytest.approx(900.0, abs=1.0)
-    finally:
-        process.kill()
-        process.communicate(60.0)

@@ -70,22 +70,14 @@ def hostile(count: int) -> Iterator[bytes]:
             yield bytes(packet.pack())
 
 
-@pytest.fixture
-def port() -> int:
-    """A UDP port of nobody."""
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-        probe.bind(("127.0.0.1", 0))
-        return int(probe.getsockname()[1])
-
-
 def test_a_flight_obeys_its_station_and_nobody_else(
-    free_domain: int, port: int, tmp_path: Path
+    free_domain: int, udp_port: int, tmp_path: Path
 ) -> None:
     bag, file = tmp_path / "bag", tmp_path / "a.packets"
     options = ("--actuators", "wheels", "--duration", "0.2", "--json", "--composed")
-    telemetry = ("--telemetry", str(file), "--telecommands", f"udp:127.0.0.1:{port}")
+    telemetry = ("--telemetry", str(file), "--telecommands", f"udp:127.0.0.1:{udp_port}")
     flight = PausedFlight(bag, free_domain, *options, *telemetry)
-    station, axes = Station(port), FLIGHT.controller.names.axes
+    station, axes = Station(udp_port), FLIGHT.controller.names.axes
     law = station.perform("select_law", law="ctc")
     values = {f"value_{axis}": 20.0 for axis in axes}
     gain = station.perform("set_gain", gain="ctc.k_p", **values)
@@ -110,10 +102,12 @@ def test_a_flight_obeys_its_station_and_nobody_else(
     assert check_equal(file, log) > 100
 
 
-def test_a_port_that_is_taken_and_others_addresses_are_refused(port: int, space_robot: Any) -> None:
+def test_a_port_that_is_taken_and_others_addresses_are_refused(
+    udp_port: int, space_robot: Any
+) -> None:
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as taken:
-        taken.bind(("127.0.0.1", port))
-        ran = space_robot("fly", "--telecommands", f"udp:127.0.0.1:{port}")
+        taken.bind(("127.0.0.1", udp_port))
+        ran = space_robot("fly", "--telecommands", f"udp:127.0.0.1:{udp_port}")
     assert (ran.code, "Address already in use" in ran.err) == (2, True)
     ran = space_robot("fly", "--telecommands", "udp:0.0.0.0:1234")
     assert (ran.code, "at 127.0.0.1 only, got '0.0.0.0'" in ran.err) == (2, True)
