@@ -145,7 +145,7 @@ def _urdf_with_a_defect(folder: Path) -> None:
     text = (DATA / "docs.urdf").read_text("utf-8")
     _urdf(folder)
     (folder / "ETSVII.urdf").write_text(text.replace('izz="2"', 'izz="9"'))
-    (folder / "my_laws.py").write_text(files(DOCS / "manual/control_laws.md")["my_laws.py"])
+    (folder / "my_laws.py").write_text(files(DOCS / "manual/own_law.md")["my_laws.py"])
 
 
 def _slow_gains(folder: Path) -> None:

@@ -111,7 +111,7 @@ def test_with_h_bar_zero_the_estimate_has_the_nominal_inertia(name: str) -> None
 
 def test_the_integral_in_the_manual_is_kept_and_begins_at_zero(tmp_path: Path) -> None:
     """At the start, and when the law takes over again."""
-    manual = (ROOT / "docs/manual/control_laws.md").read_text("utf-8")
+    manual = (ROOT / "docs/manual/own_law.md").read_text("utf-8")
     module = re.search(r"```python\n(# my_pid.py.*?)```", manual, re.DOTALL)
     assert module
     (tmp_path / "my_pid.py").write_text(module[1])
