@@ -45,8 +45,7 @@ PAGE = Page(
             [_modulated(law, gains) for law, gains in SETS],
         ),
         Sentence(
-            "Case 1 with TDE-STC demands of the most loaded wheel of the pyramid {} N m and "
-            "{} N m s.",
+            "the wheel with the largest load must deliver {} N m and {} N m s.",
             (
                 Number({"controller": "tde_stc"}, asked_of_a_wheel("peak torque"), ".2f"),
                 Number({"controller": "tde_stc"}, asked_of_a_wheel("largest momentum"), ".1f"),
@@ -57,8 +56,7 @@ PAGE = Page(
             (Number({"actuators": "none", "controller": "tde_stc"}, DRIFT, ".1f", DEGREES),),
         ),
         Sentence(
-            "the largest motor torque of a wheel is {} N m with `pseudo_inverse`, {} with "
-            "`least_largest`.",
+            "the largest motor torque of a wheel is {} N m with the first, {} N m with the second.",
             tuple(
                 Number(options, largest_wheel_torque, ".2f")
                 for options in (
@@ -81,15 +79,14 @@ PAGE = Page(
             ),
         ),
         Sentence(
-            "With `fine` sensors and filtered navigation the error is about the same (tde_stc {}), "
-            "with `tactical` {}.",
+            "the error is about the same for `fine` sensors (tde_stc {}), and {} for `tactical` ones.",
             (
                 Number({**ON_THRUSTERS, "sensors": "fine"}, ATTITUDE),
                 Number({**ON_THRUSTERS, "sensors": "tactical"}, ATTITUDE),
             ),
         ),
         Sentence(
-            "with the errors of ideal torque (tde_stc {}, ideal {})",
+            "the errors are those of ideal torque (tde_stc {}, ideal {})",
             (Number(_on_wheels("tde_stc"), ATTITUDE), Number({"controller": "tde_stc"}, ATTITUDE)),
         ),
     ),
