@@ -79,7 +79,8 @@ PAGE = Page(
             ),
         ),
         Sentence(
-            "the error is about the same for `fine` sensors (tde_stc {}), and {} for `tactical` ones.",
+            "the error is about the same for `fine` sensors (tde_stc {}), and {} for `tactical` "
+            "ones.",
             (
                 Number({**ON_THRUSTERS, "sensors": "fine"}, ATTITUDE),
                 Number({**ON_THRUSTERS, "sensors": "tactical"}, ATTITUDE),
