@@ -98,8 +98,7 @@ PAGE = Page(
             (Number(IDEAL, PEAKS[1], ".1f"), Number(IDEAL, "sizing.peak_momentum", ".1f")),
         ),
         Sentence(
-            "flies each leg in 50 s with {} N m of the most loaded wheel, and an attitude error "
-            "of {}.",
+            "The most loaded wheel needs {} N m, and the attitude error is {}.",
             (Number(SLOW, largest_wheel_torque), Number(SLOW, ATTITUDE)),
         ),
         Sentence(
@@ -122,13 +121,13 @@ PAGE = Page(
             ),
         ),
         Sentence(
-            "recovers: {} at 30 s, {} at 90 s, {} at the end.",
+            "recovers: the error is {} at 30 s, {} at 90 s and {} at the end.",
             tuple(
                 Number(COMES_BACK, attitude_error_at(t), ".2g", 1e3) for t in (30.0, 90.0, 180.0)
             ),
         ),
         Sentence(
-            "{} g of propellant, {} pulses, the robot is pushed by {} mm.",
+            "the flight takes {} g of propellant and {} pulses, and pushes the robot by {} mm.",
             (
                 Number(ROBUST_THRUSTERS, propellant, ".0f", 1e3),
                 Number(ROBUST_THRUSTERS, pulses, ".0f"),
