@@ -1,7 +1,7 @@
 """Makes the pictures of the pages: `python docs/pictures [NAME ...]`, all without a name.
 
-Each is a function with `@picture` in a file of this folder, which draws what the product computes:
-the numbers come from flights, plans and the model. Takes two minutes once kernels are compiled.
+Each is a function with `@picture` in a file of this folder, which draws what the product computes.
+Takes a minute on two quiet cores once kernels are compiled.
 """
 
 from __future__ import annotations

@@ -62,7 +62,6 @@ class Pose:
     """Frames of all bodies of a robot at a row of a log, on inertial axes."""
 
     def __init__(self, robot: Robot, log: FlightLog, row: int) -> None:
-        """Compute them."""
         outer = base_axes(log.quaternion[row][:, None])
         frames = [*body_frames(robot, outer, log.joint_positions[row][:, None])]
         base = log.base_position[row]
@@ -85,7 +84,7 @@ def robot() -> Figure:
     """The paper's robot after 15 s of free floating: bodies, joint axes, frames."""
     log = Scenario(actuators="none", duration=15.0).fly().log
     pose = Pose(flown_robot(log), log, -1)
-    figure, axes = theme.drawing(6.0, 4.6)
+    figure, axes = theme.drawing(6.0, 5.2)
     pose.draw(axes, 6.0)
     sides = (0.75, -0.6, 0.62, -0.7, 0.62, 0.35)  # of the numbers, so that none is on another
     for number, side in enumerate(sides, start=1):
@@ -101,7 +100,7 @@ def robot() -> Figure:
     for joint, place, angle in ((2, (-1.15, 2.3), -70), (3, (0.35, 3.05), 9)):
         length = norm(pose.origins[joint + 1] - pose.origins[joint])
         axes.text(*place, f"{length:.2f} m", color=MUTED, rotation=angle)
-    axes.set(xlim=(-2.0, 4.2), ylim=(-1.2, 4.6))
+    axes.set(xlim=(-1.9, 4.1), ylim=(-1.1, 4.5))
     return figure
 
 

@@ -24,13 +24,12 @@ Array = NDArray[np.float64]
 Point = tuple[float, float]
 
 FOLDER = Path(__file__).parent
-WIDTH = 6.4
-"""Inches."""
+WIDTH = 6.4  # inches
 COLOURS = {
     "ink": ("#1b1f24", "#e6e9ee"),
     "muted": ("#57606a", "#a3abb8"),
     "grid": ("#d8dee4", "#3b424d"),
-    "background": ("#ffffff", "#1a1d23"),
+    "background": ("#ffffff", "#1e2129"),
     "blue": ("#0072b2", "#56b4e9"),
     "orange": ("#c44e00", "#f59042"),
     "green": ("#00795a", "#35c199"),
@@ -77,8 +76,7 @@ def box(axes: Axes, place: Point, text: str, size: Point, color: str) -> None:
 def arrow(axes: Axes, *points: Point, color: str = INK) -> None:
     """Draw a line through points, with a head at the last."""
     axes.plot(*np.array(points[:-1]).T, color=color, linewidth=1.5)
-    head = "-|>,head_width=0.25,head_length=0.5"
-    style = {"arrowstyle": head, "shrinkA": 0, "shrinkB": 0, "color": color, "linewidth": 1.5}
+    style = {"arrowstyle": "-|>", "shrinkA": 0, "shrinkB": 0, "color": color, "linewidth": 1.5}
     axes.annotate("", points[-1], points[-2], arrowprops=style)
 
 
