@@ -42,7 +42,6 @@ FONTS = "text{font-family:system-ui,'Segoe UI',Roboto,'Helvetica Neue',Arial,san
 
 mpl.rcParams.update(mpl.rc_params_from_file(FOLDER / "theme.mplstyle", use_default_template=False))
 PICTURES: dict[str, Callable[[], Figure]] = {}
-"""By the names of their files."""
 
 
 def picture(function: Callable[[], Figure]) -> Callable[[], Figure]:
@@ -67,9 +66,9 @@ def drawing(x: float, y: float) -> tuple[Figure, Axes]:
 
 def box(axes: Axes, place: Point, text: str, size: Point, color: str) -> None:
     """Draw a box about its centre."""
-    corner = np.array(place) - 0.5 * np.array(size)
-    style = {"boxstyle": "round,pad=0,rounding_size=0.12", "linewidth": 1.8, "facecolor": "none"}
-    axes.add_patch(mpl.patches.FancyBboxPatch(corner, *size, edgecolor=color, **style))
+    corner, shape = (place[0] - 0.5 * size[0], place[1] - 0.5 * size[1]), "round,pad=0"
+    patch = mpl.patches.FancyBboxPatch(corner, *size, boxstyle=f"{shape},rounding_size=0.12")
+    axes.add_patch(patch).set(edgecolor=color, facecolor="none", linewidth=1.8)
     axes.text(*place, text, ha="center", va="center", linespacing=1.35)
 
 
@@ -88,7 +87,8 @@ def powers(*scales: Axis) -> None:
         return "10" + str(round(np.log10(value))).translate(raised)
 
     for scale in scales:
-        scale.axes.set(**{f"{scale.axis_name}scale": "log"})
+        is_x = scale is scale.axes.xaxis
+        scale.axes.set(**{"xscale" if is_x else "yscale": "log"})
         scale.set_major_formatter(FuncFormatter(text))
         scale.set_minor_formatter("")
 
