@@ -1,7 +1,7 @@
 """Makes the pictures of the pages: `python docs/pictures [NAME ...]`, all without a name.
 
 Each is a function with `@picture` in a file of this folder, which draws what the product computes.
-Takes a minute on two quiet cores once kernels are compiled.
+With compiled kernels this takes a few minutes at most.
 """
 
 from __future__ import annotations
