@@ -18,6 +18,7 @@ from space_robot.flight.graph.node_names import LISTENERS
 from space_robot_msgs_py import topics
 
 ROOT = Path(__file__).resolve().parents[1]
+DOCS = ROOT / "docs"
 DOCUMENTS = [
     *(ROOT / "README.md", ROOT / "CONTRIBUTING.md"),
     *sorted((ROOT / "docs").rglob("*.md")),
@@ -32,6 +33,24 @@ PREFIXES = (
     "space_robot_sim.",
     "space_robot_model.dynamics.",
 )
+WITHOUT_PICTURE = {
+    "tables and lists to look things up": (
+        "README compare recipes reference/faults reference/metrics reference/parameters "
+        "reference/topics manual/bags manual/campaign_variables measurements/performance "
+        "measurements/reality"
+    ),
+    "steps and commands": (
+        "manual/cluster manual/flight_code manual/frameworks manual/installation manual/launch "
+        "manual/namespaces manual/replay manual/requirements manual/ros manual/security "
+        "manual/urdf manual/viewers"
+    ),
+    "about code, which it shows, or numbers of a few runs": (
+        "explanation/gpu explanation/kernels explanation/one_law_three_times "
+        "explanation/same_bits explanation/model_predictive_control"
+    ),
+}
+"""Pages by the reason why they have none."""
+PICTURE = re.compile(r"!\[([^\]]*)\]\(([^)]+)\)")
 DOTTED = re.compile(r"`([A-Za-z_]\w*(?:\.\w+)+)`")
 COMMAND = re.compile(r"space-robot ((?:[a-z]+)\b[^`;|#\n]*)")
 
@@ -76,6 +95,43 @@ def test_links_lead_to_files_and_those_named_with_their_folder_exist(document: P
             assert (document.parent / target.split("#")[0]).exists(), target
     for name in re.findall(r"`((?:space_robot_\w+|tests|config|docs)/[\w./]+)`", text):
         assert (ROOT / name).exists(), name
+
+
+def test_every_page_has_a_picture_or_a_reason_to_have_none() -> None:
+    pages = {path.relative_to(DOCS).with_suffix("").as_posix() for path in DOCS.rglob("*.md")}
+    reasoned = {page for group in WITHOUT_PICTURE.values() for page in group.split()}
+    assert reasoned <= pages
+    for page in pages - reasoned:
+        text = (DOCS / f"{page}.md").read_text("utf-8")
+        assert PICTURE.search(text) or "```mermaid" in text, page
+
+
+def test_pictures_have_a_text_for_those_who_do_not_see_them_and_a_caption() -> None:
+    for page in DOCS.rglob("*.md"):
+        text = page.read_text("utf-8")
+        for alternative, file in PICTURE.findall(text):
+            assert alternative, (page, file)
+            if file.endswith(".svg"):
+                assert re.search(rf"\({re.escape(file)}\)\n\n\*[^\n]+\*\n", text), (page, file)
+
+
+def test_every_picture_of_the_folder_is_drawn_by_a_script_and_shown_by_a_page() -> None:
+    folder = DOCS / "pictures"
+    scripts = "".join(path.read_text("utf-8") for path in folder.glob("*.py"))
+    drawn = set(re.findall(r"^@theme\.picture\ndef (\w+)", scripts, re.MULTILINE))
+    assert drawn == {path.stem for path in folder.glob("*.svg")}
+    shown = "".join(path.read_text("utf-8") for path in DOCS.rglob("*.md"))
+    assert drawn == set(re.findall(r"pictures/(\w+)\.svg\)", shown))
+
+
+def test_pictures_are_small_and_follow_the_scheme_of_the_reader() -> None:
+    for path in (DOCS / "pictures").glob("*.svg"):
+        text = path.read_text("utf-8")
+        assert len(text.encode()) < 80_000, path
+        assert "@media (prefers-color-scheme:dark){svg{--ink:" in text
+        colours = re.findall(r"(?:fill|stroke): ([^;\"]+)", text)
+        assert {c for c in colours if not c.startswith("var(--")} <= {"none"}, path
+        assert "<metadata" not in text
 
 
 def test_the_page_on_eleven_laws_has_what_was_flown() -> None:

@@ -108,7 +108,7 @@ def test_equations_and_diagrams_are_drawn(site: Path) -> None:
         text = html.read_text("utf-8")
         assert "arithmatex" not in text
         assert 'class="diagram"><code>' not in text
-    drawn = (site / "explanation/architecture.html").read_text("utf-8")
+    drawn = (site / "explanation/fault_handling.html").read_text("utf-8")
     assert '<figure class="diagram"><svg' in drawn
 
 
