@@ -11,16 +11,21 @@ import json
 import platform
 import re
 import sys
-import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from datetime import date
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
+from space_robot.console.tables import Table, as_markdown, named
+
+Array = NDArray[np.float64]
 DOCS = Path(__file__).parents[1]
 PAGE, NUMBERS, PICTURE = (DOCS / f"validation.{kind}" for kind in ("md", "json", "svg"))
-PACKAGES = "space_robot", "numpy", "numba", "scipy", "pin", "mujoco"
+PACKAGES = "space_robot", "numpy", "numba"
 KEPT = "linear momentum", "angular momentum", "energy"
 OURS = "space_robot, RK4"
 INK, FAINT, LINES = "#010101", "#020202", ("#030303", "#040404", "#050505", "#060606")
@@ -35,14 +40,14 @@ THEME = {  # in light and in dark
 }
 
 
-def measure() -> tuple[list[dict[str, Any]], dict[str, Any]]:
+def measure() -> tuple[list[dict[str, Any]], dict[str, Array]]:
     """Return all rows, printed one by one, and drifts by integrator."""
     sys.path += [str(DOCS.parent / folder) for folder in ("tests", "tools/benchmarks")]
     import physics
     import software
     from rows import PINOCCHIO, ValidationRow
 
-    drifts = {}
+    drifts: dict[str, Array] = {}
 
     def conserved() -> Iterator[ValidationRow]:
         for name in ("", *physics.INTEGRATORS):
@@ -56,25 +61,20 @@ def measure() -> tuple[list[dict[str, Any]], dict[str, Any]]:
     for section in (*sections, software.navigation, software.allocation, software.statistics):
         rows += [announced(row) for row in section()]
     rows += [announced(row) for row in software.bits()]
-    return rows, {name: column.tolist() for name, column in drifts.items()}
+    return rows, drifts
 
 
 def announced(row: Any) -> dict[str, Any]:
     """Print a row; return it by names."""
-    print(f"{' | '.join(cells(row._asdict()))}{'' if row.difference <= row.limit else '  BEYOND'}")
-    sys.stdout.flush()
     fields: dict[str, Any] = row._asdict()
+    is_right = row.difference <= row.limit
+    print(" | ".join(cells(fields)) + ("" if is_right else ": beyond its limit"), flush=True)
     return fields
 
 
 def cells(row: dict[str, Any]) -> list[str]:
     """Return the texts of a row."""
-    return [
-        row["check"],
-        row["against"],
-        row["extent"],
-        *map(short, (row["difference"], row["limit"])),
-    ]
+    return [text if isinstance(text, str) else short(text) for text in row.values()]
 
 
 def short(number: float) -> str:
@@ -82,32 +82,30 @@ def short(number: float) -> str:
     return f"{number:.2g}".replace("e-0", "e-")
 
 
-def table(head: list[str], rows: list[list[str]]) -> str:
-    """Return a table in Markdown."""
-    lines = [f"| {' | '.join(row)} |" for row in (head, *rows)]
-    return "\n".join([lines[0], "|---" * len(head) + "|", *lines[1:]])
-
-
 def written(page: str, numbers: dict[str, Any]) -> str:
     """Return the page with the tables of these numbers."""
-    head = ["what is compared", "with", "over", "largest difference", "limit"]
-    drifts = [
-        [name, *(short(max(column)) for column in list(zip(*rows, strict=True))[1:])]
-        for name, rows in numbers["drifts"].items()
-    ]
+    head = "compared", "with", "over", "largest difference", "limit"
     made = ", ".join(f"{name} {text}" for name, text in numbers["versions"].items())
     parts = {
         "rows": table(head, [cells(row) for row in numbers["rows"]]),
-        "drifts": table(["", *KEPT], drifts),
-        "made": f"Made on {numbers['date']} in {numbers['seconds']} s: {made}.",
+        "drifts": table(
+            ("integrator", *KEPT),
+            [[name, *map(short, drift)] for name, drift in numbers["drifts"].items()],
+        ),
+        "made": f"Made on {numbers['date']} with {made}.",
     }
     for name, part in parts.items():
         place = re.compile(rf"(<!-- begin {name} -->\n\n).*?(\n\n<!-- end -->)", re.S)
-        page = place.sub(lambda found, part=part: f"{found[1]}{part}{found[2]}", page)
+        page = place.sub(lambda match, part=part: f"{match[1]}{part}{match[2]}", page)
     return page
 
 
-def draw(drifts: dict[str, Any]) -> None:
+def table(head: Sequence[str], rows: Sequence[list[str]]) -> str:
+    """Return a table in Markdown."""
+    return as_markdown("", [Table.of("", [*map(named, head)], rows)]).strip("# \n")
+
+
+def draw(drifts: dict[str, Array]) -> None:
     """Draw the drift of angular momentum over time."""
     import matplotlib as mpl
     from matplotlib.figure import Figure
@@ -119,7 +117,7 @@ def draw(drifts: dict[str, Any]) -> None:
         axes = figure.subplots()
         shown = [name for name in drifts if "fast" not in name]  # the same line as Euler's
         for name, colour in zip(shown, LINES, strict=True):
-            time_s, drift = [row[0] for row in drifts[name]], [row[2] for row in drifts[name]]
+            time_s, drift = drifts[name][:, [0, 2]].T
             label = f"{name}, implicitfast" if name.endswith("Euler") else name
             axes.semilogy(time_s, drift, color=colour, linewidth=2.0, label=label)
         axes.grid(color=FAINT)
@@ -146,14 +144,12 @@ def main() -> None:
     """Run the command."""
     parser = argparse.ArgumentParser(prog="make validation", description=__doc__)
     parser.parse_args()
-    begun = time.monotonic()
     rows, drifts = measure()
     if any(not row["difference"] <= row["limit"] for row in rows):
         sys.exit("beyond its limit: see above")
     versions = {"Python": platform.python_version(), **{name: version(name) for name in PACKAGES}}
-    seconds = round(time.monotonic() - begun)
-    made = {"date": f"{date.today()}", "seconds": seconds, "versions": versions}
-    numbers = {**made, "rows": rows, "drifts": drifts}
+    largest = {name: np.max(drift, axis=0)[1:].tolist() for name, drift in drifts.items()}
+    numbers = {"date": f"{date.today()}", "versions": versions, "rows": rows, "drifts": largest}
     NUMBERS.write_text(f"{json.dumps(numbers, indent=1)}\n", "utf-8")
     PAGE.write_text(written(PAGE.read_text("utf-8"), numbers), "utf-8")
     draw(drifts)
