@@ -31,8 +31,8 @@ export FASTDDS_BUILTIN_TRANSPORTS ?= UDPv4
 # Kernels compile in less time, and are as fast, with the same bits.
 export NUMBA_OPT ?= 1
 
-.PHONY: help setup fly test test-docs check quick coverage hooks lint kernels docs dist ground bench mutation notebooks \
-  newest constraints clean
+.PHONY: help setup fly test test-docs check quick coverage hooks lint kernels docs dist ground bench validation mutation \
+  notebooks newest constraints clean
 
 help:
 	@echo "make setup               .venv with the package and ROS 2 Jazzy"
@@ -49,6 +49,7 @@ help:
 	@echo "make dist                a wheel and a source distribution in dist/"
 	@echo "make ground              the ground display: its libraries, and Open MCT by npm"
 	@echo "make bench [ARGS=...]    how fast it is, e.g. make bench ARGS='plant laws'; --help tells more"
+	@echo "make validation          physics and decisions beside independent programs, for docs/validation.md"
 	@echo "make mutation [ARGS=...] small faults put in, one at a time: do the tests notice?"
 	@echo "make notebooks           run docs/notebooks and keep what they show"
 	@echo "make newest [ARGS=...]   make check with the newest versions of everything, in .venv-newest"
@@ -113,6 +114,9 @@ ground: $(VENV)/.made
 
 bench: $(VENV)/.tests
 	@$(VENV)/bin/python tools/benchmarks $(ARGS)
+
+validation: $(VENV)/.tests
+	@$(VENV)/bin/python docs/validation
 
 # What is compiled here, no mutant compiles again.
 mutation: kernels $(VENV)/.tests

@@ -7,10 +7,11 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.optimize import linprog
 
 from space_robot_control.allocation.allocation import Allocation, allocation_code
 from space_robot_control.allocation.settings import AllocationSettings
-from space_robot_control.allocation.wheel_set import WheelSet, tabulate
+from space_robot_control.allocation.wheel_set import WheelSet, least_largest, tabulate
 from space_robot_model.hardware.base_actuators import BaseActuatorSettings
 from space_robot_msgs_py.compiled.kernels import RecordFunction
 from space_robot_msgs_py.samples import MOST_WHEELS, State
@@ -41,6 +42,30 @@ def wheel_set(axes: Array, loads: ArrayLike = 1.0, out: tuple[int, ...] = ()) ->
     wheels.takes_part[list(out)] = 0.0
     tabulate(wheels, axis, count)
     return wheels
+
+
+def loads_of(axes: Array, full: Array, wanted: Array, out: tuple[int, ...] = ()) -> Array:
+    torque = np.zeros(MOST_WHEELS)
+    least_largest(wheel_set(axes, full, out), len(axes), tuple(wanted), torque)
+    return np.asarray(torque[: len(axes)] / full)
+
+
+def least(axes: Array, full: Array, wanted: Array) -> float:
+    """By linear programming: min t with A u = wanted, -t <= u_k / full_k <= t."""
+    count = len(axes)
+    columns = np.hstack([unit(axes).T * full, np.zeros((3, 1))])
+    bounds = np.vstack([np.hstack([s * np.eye(count), -np.ones((count, 1))]) for s in (1, -1)])
+    found = linprog(
+        np.append(np.zeros(count), 1.0),
+        A_ub=bounds,
+        b_ub=np.zeros(2 * count),
+        A_eq=columns,
+        b_eq=wanted,
+        bounds=[(None, None)] * count + [(0, None)],
+        method="highs",
+    )
+    assert found.success
+    return float(found.fun)
 
 
 def couples(force: float = 1.0, shortest_pulse: float = 0.01) -> dict[str, Any]:

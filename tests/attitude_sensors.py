@@ -7,7 +7,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from oracles import skew
 from scipy.integrate import solve_ivp
+from scipy.linalg import expm, solve_discrete_are
 
 from space_robot_control.navigation.attitude_filter import (
     AttitudeFilter,
@@ -55,6 +57,29 @@ class Case(NamedTuple):
 
     def filter(self) -> AttitudeFilter:
         return Navigation.build(1, self.settings, self.period).attitude
+
+
+def riccati(case: Case, omega: Array) -> Array:
+    """(6, 6) covariance before an update, in steady state, of a body that turns at ``omega``."""
+    continuous = np.zeros((6, 6))
+    continuous[:3, :3], continuous[:3, 3:] = -skew(omega), -np.eye(3)
+    density = np.diag([case.arw**2] * 3 + [case.rrw**2] * 3)
+    dt = case.period * case.interval
+    # Van Loan 1978
+    both = expm(np.block([[-continuous, density], [np.zeros((6, 6)), continuous.T]]) * dt)
+    transition = both[6:, 6:].T
+    noise = transition @ both[:6, 6:]
+    of_tracker = np.diag([case.across**2] * 2 + [case.about**2])
+    scale = np.diag([1e5] * 3 + [1e8] * 3)  # rad and rad/s differ by far
+    inverse = np.linalg.inv(scale)
+    found = solve_discrete_are(
+        (scale @ transition @ inverse).T,
+        np.eye(6, 3),
+        scale @ noise @ scale,
+        scale[:3, :3] @ of_tracker @ scale[:3, :3],
+    )
+    covariance: Array = inverse @ found @ inverse
+    return covariance
 
 
 class Measured(NamedTuple):

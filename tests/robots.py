@@ -9,6 +9,7 @@ import numpy as np
 import yaml
 from numpy.typing import ArrayLike, NDArray
 from oracles import rotation_of
+from oracles.momenta import state_of
 from oracles.orbit import body_places
 from paths import CONFIG, DATA
 from strategies import with_gears
@@ -169,6 +170,15 @@ def orbiting_plant(robot: Robot, period: float, **settings: Any) -> Plant:
     joints = {"initial_joints_deg": [0.0] * robot.n, "friction": LOCKED}
     usual = {"base_actuation": "none", **joints, **orbit}
     return Plant(robot, PlantSettings.model_validate({**usual, **settings}), period)
+
+
+def plant_numbers(plant: Plant) -> Array:
+    """A state as `RotorEquations` has it."""
+    truth, count = plant.truth, len(geared_joints(plant.robot))
+    state = state_of(plant.robot, truth)
+    of_motors = truth.motor_velocities[:count], truth.motor_positions[:count]
+    of_robot = state.quaternion, state.theta, state.velocity
+    return np.concatenate([truth.base_position, *of_robot, *of_motors])
 
 
 def set_motion(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 import runpy
 import shlex
@@ -85,6 +86,15 @@ def test_snippets_of_the_errata_run(capsys: pytest.CaptureFixture[str]) -> None:
         name = law.lower().replace("-", "_")
         delays = " ".join(re.findall(rf"^{name} (.*)$", printed, re.MULTILINE))
         assert re.findall(r"[\d.]+", row) == re.findall(r"[\d.]+(?= ms)", delays)
+
+
+def test_the_validation_page_has_the_numbers_of_its_last_run() -> None:
+    program = runpy.run_path(str(ROOT / "docs/validation"))
+    page, numbers = (program[name].read_text("utf-8") for name in ("PAGE", "NUMBERS"))
+    rows = json.loads(numbers)["rows"]
+    assert program["written"](page, json.loads(numbers)) == page, "run `make validation`"
+    assert len(rows) > 20
+    assert all(row["difference"] <= row["limit"] for row in rows)
 
 
 @pytest.mark.parametrize("document", DOCUMENTS, ids=lambda p: p.name)

@@ -6,14 +6,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from allocation_bench import PERIOD, PYRAMID, AllocationBench, unit, wheel_set
+from allocation_bench import PERIOD, PYRAMID, AllocationBench, least, loads_of, unit, wheel_set
 from numpy.typing import NDArray
-from scipy.optimize import linprog
 
 from space_robot_control.allocation.allocation import diagnose
-from space_robot_control.allocation.wheel_set import least_largest
 from space_robot_control.allocation.wheels import FULL
-from space_robot_msgs_py.samples import MOST_WHEELS
 
 Array = NDArray[np.float64]
 CUBE = np.eye(3)
@@ -61,30 +58,6 @@ def test_tables_are_those_of_weighted_least_squares(count: int) -> None:
 
 
 # Least largest loads
-
-
-def loads_of(axes: Array, full: Array, wanted: Array, out: tuple[int, ...] = ()) -> Array:
-    torque = np.zeros(MOST_WHEELS)
-    least_largest(wheel_set(axes, full, out), len(axes), tuple(wanted), torque)
-    return np.asarray(torque[: len(axes)] / full)
-
-
-def least(axes: Array, full: Array, wanted: Array) -> float:
-    """By linear programming: min t with A u = wanted, -t <= u_k / full_k <= t."""
-    count = len(axes)
-    columns = np.hstack([unit(axes).T * full, np.zeros((3, 1))])
-    bounds = np.vstack([np.hstack([s * np.eye(count), -np.ones((count, 1))]) for s in (1, -1)])
-    found = linprog(
-        np.append(np.zeros(count), 1.0),
-        A_ub=bounds,
-        b_ub=np.zeros(2 * count),
-        A_eq=columns,
-        b_eq=wanted,
-        bounds=[(None, None)] * count + [(0, None)],
-        method="highs",
-    )
-    assert found.success
-    return float(found.fun)
 
 
 def check(axes: Array, full: Array, wanted: Array) -> None:

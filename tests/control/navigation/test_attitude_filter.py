@@ -15,13 +15,12 @@ from attitude_sensors import (
     filtered,
     measure,
     product,
+    riccati,
     turned_by,
 )
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from oracles import skew
 from paths import ROOT
-from scipy.linalg import expm, solve_discrete_are
 from scipy.stats import chi2
 
 from space_robot_control.navigation.attitude_filter import (
@@ -30,29 +29,6 @@ from space_robot_control.navigation.attitude_filter import (
     update,
 )
 from space_robot_control.navigation.navigation import Navigation
-
-
-def riccati(case: Case, omega: Array) -> Array:
-    """(6, 6) covariance before an update, in steady state, of a body that turns at ``omega``."""
-    continuous = np.zeros((6, 6))
-    continuous[:3, :3], continuous[:3, 3:] = -skew(omega), -np.eye(3)
-    density = np.diag([case.arw**2] * 3 + [case.rrw**2] * 3)
-    dt = case.period * case.interval
-    # Van Loan 1978
-    both = expm(np.block([[-continuous, density], [np.zeros((6, 6)), continuous.T]]) * dt)
-    transition = both[6:, 6:].T
-    noise = transition @ both[:6, 6:]
-    of_tracker = np.diag([case.across**2] * 2 + [case.about**2])
-    scale = np.diag([1e5] * 3 + [1e8] * 3)  # rad and rad/s differ by far
-    inverse = np.linalg.inv(scale)
-    found = solve_discrete_are(
-        (scale @ transition @ inverse).T,
-        np.eye(6, 3),
-        scale @ noise @ scale,
-        scale[:3, :3] @ of_tracker @ scale[:3, :3],
-    )
-    covariance: Array = inverse @ found @ inverse
-    return covariance
 
 
 def still(case: Case, ticks: int, rng: np.random.Generator, bias: object = None) -> Measured:

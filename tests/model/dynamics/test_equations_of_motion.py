@@ -14,10 +14,12 @@ from numpy.typing import NDArray
 from oracles import (
     attitude_jacobian_base,
     attitude_jacobian_inertial,
+    in_inertial,
     pinocchio_acceleration,
     pinocchio_bias_force,
     pinocchio_forward_dynamics,
     pinocchio_mass_matrix,
+    references_of,
     rotation_of,
     skew,
 )
@@ -68,28 +70,10 @@ from space_robot_model.robot.dynamics import (
     inverse_dynamics,
     mass_matrix,
 )
-from space_robot_msgs_py.compiled.records import Block
-from space_robot_msgs_py.samples import MOST_WHEELS, Reference, ReferenceChunk
+from space_robot_msgs_py.samples import MOST_WHEELS, ReferenceChunk
 
 Array = NDArray[np.float64]
 FEW = settings(max_examples=40)
-
-
-def references_of(states: list[State], accelerations: Array) -> Block:
-    """``accelerations``: (N, n+3), of the base about inertial axes, then of the joints."""
-    found = np.empty(len(states), Reference.dtype(states[0].theta.size))
-    for row, state, acceleration in zip(found, states, accelerations, strict=True):
-        back = rotation_of(state.quaternion).as_matrix().T
-        row["quaternion"], row["joint_positions"] = state.quaternion, state.theta
-        row["omega_base"], row["joint_velocities"] = back @ state.w0, state.rate
-        row["alpha_base"], row["joint_accelerations"] = back @ acceleration[:3], acceleration[3:]
-    return found
-
-
-def in_inertial(state: State, torque: Array) -> Array:
-    """The force (n+6,) on inertial axes of a torque on the base's axes and the joints."""
-    base = rotation_of(state.quaternion).as_matrix() @ torque[:3]
-    return np.concatenate([np.zeros(3), base, torque[3:]])
 
 
 @FEW

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
-from oracles import TreeOracle, assert_close, pinocchio_tree, rotation_of
+from oracles import ToolOracle, TreeOracle, assert_close, pinocchio_tree, rotation_of
 from scipy.spatial.transform import Rotation
 from strategies import (
     BASE,
@@ -28,7 +28,7 @@ from space_robot_model.robot.find import find_robot, robot_names
 from space_robot_model.robot.inertia import inertia_tensor
 from space_robot_model.robot.kinematics import tool_state
 from space_robot_model.robot.markers import RobotMarkers
-from space_robot_model.robot.parts import RobotTree, Visual
+from space_robot_model.robot.parts import Visual
 from space_robot_model.robot.placements import (
     RobotPoses,
     base_axes,
@@ -139,36 +139,6 @@ def test_of_many_ticks_each_tool_is_that_of_its_own(paper_robot: Robot) -> None:
         alone = tool_pose(paper_robot, quaternion[k : k + 1], theta[k : k + 1])
         np.testing.assert_array_equal(rotation[k], alone[0][0])
         np.testing.assert_array_equal(position[k], alone[1][0])
-
-
-class ToolOracle(TreeOracle):
-    """Pinocchio's motion of a tree with zero momenta, and of one of its tools."""
-
-    def __init__(self, robot: Robot, tree: RobotTree, tool: str, seed: int) -> None:
-        super().__init__(pinocchio_tree(tree), BASE, robot.all_joint_names, seed)
-        name = tool.removeprefix("tool of ")
-        frame = next(own for own in tree.tools if own.name == tool)
-        carrier = self.model.frames[self.model.getFrameId(name, pin.FrameType.BODY)]
-        at = carrier.placement * pin.SE3(frame.rotation, frame.position)
-        self.tool = self.model.addFrame(
-            pin.Frame(tool, carrier.parentJoint, at, pin.FrameType.OP_FRAME)
-        )
-        self.data = self.model.createData()
-        pin.framesForwardKinematics(self.model, self.data, self.q)
-        self.map = pin.computeCentroidalMap(self.model, self.data, self.q).copy()
-
-    def jacobian_of(self, attitude: str) -> Array:
-        """Twist of the tool by joint velocities: the base moves as the momenta ask for."""
-        base, joints = self.map[:, :6], self.map[:, self.columns]
-        if attitude == "held":  # Pinocchio's base velocity is linear first
-            base, joints = base[:3, :3], joints[:3]
-        velocity = np.zeros((self.model.nv, len(self.columns)))
-        velocity[self.columns] = np.eye(len(self.columns))
-        velocity[: len(base)] = -np.linalg.solve(base, joints)
-        rows: Array = pin.computeFrameJacobian(
-            self.model, self.data, self.q, self.tool, pin.LOCAL_WORLD_ALIGNED
-        )
-        return rows @ velocity
 
 
 @settings(max_examples=50)

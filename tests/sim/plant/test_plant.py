@@ -13,11 +13,10 @@ from numpy.typing import NDArray
 from oracles import assert_close, rotation_of
 from oracles.momenta import kinetic_energy, momentum, state_of
 from oracles.rotors import RotorEquations, flown_settings, random_motor_rotors, random_rotors
-from robots import ANGLES_DEG, LOCKED, NO_FRICTION, PERIOD, rigid_robot
+from robots import ANGLES_DEG, LOCKED, NO_FRICTION, PERIOD, plant_numbers, rigid_robot
 from strategies import random_gears, random_quaternion, random_robot, random_tree, with_gears
 
 from space_robot_model.robot import Robot
-from space_robot_model.robot.gears import geared_joints
 from space_robot_msgs_py.compiled.records import assign
 from space_robot_msgs_py.errors import DivergedError
 from space_robot_msgs_py.samples import Command, RobotState
@@ -157,15 +156,6 @@ def tree(rng: np.random.Generator) -> Robot:
     return with_gears(robot, [gear and gear._replace(ratio=10.0) for gear in robot.gears])
 
 
-def numbers(plant: Plant) -> Array:
-    """A state as `RotorEquations` has it."""
-    truth, count = plant.truth, len(geared_joints(plant.robot))
-    state = state_of(plant.robot, truth)
-    of_motors = truth.motor_velocities[:count], truth.motor_positions[:count]
-    of_robot = state.quaternion, state.theta, state.velocity
-    return np.concatenate([truth.base_position, *of_robot, *of_motors])
-
-
 @pytest.mark.parametrize("seed", [0, 1, 2])
 def test_a_flight_is_the_one_that_scipy_integrates(seed: int) -> None:
     """0.2 s in two holds of torque: springs with damping, friction of the robot's own, gears.
@@ -207,7 +197,7 @@ def test_a_flight_is_the_one_that_scipy_integrates(seed: int) -> None:
     damping = np.where(np.isnan(own), usual, own)
     for k, spring in enumerate(robot.springs):
         damping[n + k] += spring.damping
-    expected = numbers(plant)
+    expected = plant_numbers(plant)
     for begin, torque in ((0.0, TORQUE), (hold, -0.5 * TORQUE[::-1])):
 
         def force(t: float, x: Array, torque: Array = torque) -> Array:
@@ -227,7 +217,7 @@ def test_a_flight_is_the_one_that_scipy_integrates(seed: int) -> None:
 
         expected = equations.fly(expected, begin, begin + hold, force).y[:, -1]
         fly(plant, np.tile(torque, (200, 1)))
-        assert_close(numbers(plant), expected, 1e-9)
+        assert_close(plant_numbers(plant), expected, 1e-9)
     assert np.abs(plant.truth.passive_velocities[:3]).max() > 0.01, "springs must swing"
     deflections = expected[-len(geared) :] - plant.truth.joint_positions[geared]
     assert np.abs(deflections).max() > 1e-4, "those of gears, too"
@@ -292,7 +282,10 @@ def test_a_capture_gives_no_wheel_and_no_rotor_a_momentum_of_its_own() -> None:
             own.append(inertia * (truth.wheel_velocities[:4] + axes @ truth.omega_base))
             fly(plant, torque[np.newaxis])
             if plant.tick == capture:
-                state, found = state_of(robot, plant.truth), equations.velocity(numbers(plant))
+                state, found = (
+                    state_of(robot, plant.truth),
+                    equations.velocity(plant_numbers(plant)),
+                )
                 mass, _ = equations.matrices(state.quaternion, state.theta, np.zeros(found.size))
                 speeds.append(found)
                 spins.append((mass @ found)[6 + robot.joint_count :])

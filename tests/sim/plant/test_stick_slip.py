@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import re
 from collections.abc import Callable
 from typing import Any, NamedTuple
@@ -12,7 +11,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
-from oracles import pinocchio_bias_force, pinocchio_mass_matrix, rotation_of
+from oracles.friction import solutions
 from oracles.momenta import kinetic_energy, momentum
 from robots import PERIOD, GearedFlight, oscillator
 from scipy.integrate import quad
@@ -68,31 +67,6 @@ def data_of(plant: Plant) -> Data:
     stages: Any = plant.memory.stages
     data: Data = stages["data"]
     return data
-
-
-def solutions(robot: Robot, state: State, torque: Array, coulomb: float) -> list[Array]:
-    """All friction torques (n,) that obey Coulomb's law, found by trying every combination."""
-    n = robot.n
-    inverse = np.linalg.inv(pinocchio_mass_matrix(robot, state))
-    turned = rotation_of(state.quaternion).apply(torque[:3])
-    force = np.concatenate([np.zeros(3), turned, torque[3:]])
-    free = inverse @ (force - pinocchio_bias_force(robot, state))
-    found = []
-    choices = [(np.sign(rate),) if rate else (-1.0, 0.0, 1.0) for rate in state.rate]
-    for senses in map(np.array, itertools.product(*choices)):
-        friction = coulomb * senses
-        stands = senses == 0.0
-        joints = inverse[6:, 6:]
-        rest = free[6:] - joints[:, ~stands] @ friction[~stands]
-        friction[stands] = np.linalg.solve(joints[np.ix_(stands, stands)], rest[stands])
-        acceleration = free[6:] - joints @ friction
-        leaves = (state.rate == 0.0) & ~stands
-        if (np.abs(friction[stands]) <= coulomb + 1e-12).all() and (
-            acceleration[leaves] * senses[leaves] >= -1e-12
-        ).all():
-            found.append(friction)
-    assert n == state.rate.size
-    return found
 
 
 @given(st.sampled_from([1, 3, 6]), st.integers(0, 2**32 - 1))

@@ -1,0 +1,159 @@
+"""Compare the physics and the decisions of this project with independent programs.
+
+Writes docs/validation.json, its tables into docs/validation.md, and the picture of a robot that
+tumbles. Exit code 1: a difference is beyond its limit, and nothing is written.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import platform
+import re
+import sys
+from collections.abc import Iterator, Sequence
+from datetime import date
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from space_robot.console.tables import Table, as_markdown, named
+
+Array = NDArray[np.float64]
+DOCS = Path(__file__).parents[1]
+PAGE, NUMBERS, PICTURE = (DOCS / f"validation.{kind}" for kind in ("md", "json", "svg"))
+PACKAGES = "space_robot", "numpy", "numba"
+KEPT = "linear momentum", "angular momentum", "energy"
+OURS = "space_robot, RK4"
+INK, FAINT, LINES = "#010101", "#020202", ("#030303", "#040404", "#050505", "#060606")
+"""Colours that matplotlib draws with; `themed` replaces them."""
+THEME = {  # in light and in dark
+    INK: ("#1f2328", "#e6edf3"),
+    FAINT: ("#d1d9e0", "#3d444d"),
+    LINES[0]: ("#0072b2", "#56b4e9"),
+    LINES[1]: ("#b35900", "#e69f00"),
+    LINES[2]: ("#007a5a", "#2fc99b"),
+    LINES[3]: ("#b0418a", "#e08cc0"),
+}
+
+
+def measure() -> tuple[list[dict[str, Any]], dict[str, Array]]:
+    """Return all rows, printed one by one, and drifts by integrator."""
+    sys.path += [str(DOCS.parent / folder) for folder in ("tests", "tools/benchmarks")]
+    import physics
+    import software
+    from rows import PINOCCHIO, ValidationRow
+
+    drifts: dict[str, Array] = {}
+
+    def conserved() -> Iterator[ValidationRow]:
+        for name in ("", *physics.INTEGRATORS):
+            drifts[f"MuJoCo, {name}" if name else OURS] = physics.drifts(name)
+        extent = f"{physics.DURATION_S:g} s in steps of {1e3 * physics.STEP_S:g} ms"
+        drift = float(drifts[OURS][:, 1:].max())
+        yield ValidationRow("momenta and energy of a free robot", PINOCCHIO, extent, drift, 1e-9)
+
+    rows = []
+    sections = physics.trees, conserved, physics.joints, physics.captures, physics.in_orbit
+    for section in (*sections, software.navigation, software.allocation, software.statistics):
+        rows += [announced(row) for row in section()]
+    rows += [announced(row) for row in software.bits()]
+    return rows, drifts
+
+
+def announced(row: Any) -> dict[str, Any]:
+    """Print a row; return it by names."""
+    fields: dict[str, Any] = row._asdict()
+    is_right = row.difference <= row.limit
+    print(" | ".join(cells(fields)) + ("" if is_right else ": beyond its limit"), flush=True)
+    return fields
+
+
+def cells(row: dict[str, Any]) -> list[str]:
+    """Return the texts of a row."""
+    return [text if isinstance(text, str) else short(text) for text in row.values()]
+
+
+def short(number: float) -> str:
+    """Return a number with two digits, as in 3.1e-9."""
+    return f"{number:.2g}".replace("e-0", "e-")
+
+
+def written(page: str, numbers: dict[str, Any]) -> str:
+    """Return the page with the tables of these numbers."""
+    head = "compared", "with", "over", "largest difference", "limit"
+    made = ", ".join(f"{name} {text}" for name, text in numbers["versions"].items())
+    parts = {
+        "rows": table(head, [cells(row) for row in numbers["rows"]]),
+        "drifts": table(
+            ("integrator", *KEPT),
+            [[name, *map(short, drift)] for name, drift in numbers["drifts"].items()],
+        ),
+        "made": f"Made on {numbers['date']} with {made}.",
+    }
+    for name, part in parts.items():
+        place = re.compile(rf"(<!-- begin {name} -->\n\n).*?(\n\n<!-- end -->)", re.S)
+        page = place.sub(lambda match, part=part: f"{match[1]}{part}{match[2]}", page)
+    return page
+
+
+def table(head: Sequence[str], rows: Sequence[list[str]]) -> str:
+    """Return a table in Markdown."""
+    return as_markdown("", [Table.of("", [*map(named, head)], rows)]).strip("# \n")
+
+
+def draw(drifts: dict[str, Array]) -> None:
+    """Draw the drift of angular momentum over time."""
+    import matplotlib as mpl
+    from matplotlib.figure import Figure
+
+    style = {"svg.fonttype": "none", "svg.hashsalt": "validation", "font.size": 12}
+    names = "text.color", "axes.edgecolor", "axes.labelcolor", "xtick.color", "ytick.color"
+    with mpl.rc_context({**style, **dict.fromkeys(names, INK), "font.family": "sans-serif"}):
+        figure = Figure(figsize=(6.4, 3.8), layout="constrained")
+        axes = figure.subplots()
+        shown = [name for name in drifts if "fast" not in name]  # the same line as Euler's
+        for name, colour in zip(shown, LINES, strict=True):
+            time_s, drift = drifts[name][:, [0, 2]].T
+            label = f"{name}, implicitfast" if name.endswith("Euler") else name
+            axes.semilogy(time_s, drift, color=colour, linewidth=2.0, label=label)
+        axes.grid(color=FAINT)
+        axes.spines[["top", "right"]].set_visible(False)
+        labels = {"xlabel": "time (s)", "ylabel": "drift of angular momentum"}
+        axes.set(**labels, xlim=(0, 600), ylim=(1e-15, 1.0))
+        axes.legend(frameon=False, loc="center", bbox_to_anchor=(0.5, 0.57))
+        figure.savefig(PICTURE, transparent=True, metadata={"Date": None})
+    PICTURE.write_text(themed(PICTURE.read_text("utf-8")), "utf-8")
+
+
+def themed(svg: str) -> str:
+    """Return a picture with the colours of `THEME`, by the reader's light or dark scheme."""
+    light, dark = (
+        ";".join(f"--c{colour[1:]}:{pair[k]}" for colour, pair in THEME.items()) for k in (0, 1)
+    )
+    rules = f"svg{{{light}}}@media (prefers-color-scheme: dark){{svg{{{dark}}}}}"
+    for colour in THEME:
+        svg = svg.replace(colour, f"var(--c{colour[1:]})")
+    return svg.replace("<defs>", f"<style>{rules}</style>\n <defs>", 1)
+
+
+def main() -> None:
+    """Run the command."""
+    parser = argparse.ArgumentParser(prog="make validation", description=__doc__)
+    parser.parse_args()
+    rows, drifts = measure()
+    if any(not row["difference"] <= row["limit"] for row in rows):
+        sys.exit("beyond its limit: see above")
+    versions = {"Python": platform.python_version(), **{name: version(name) for name in PACKAGES}}
+    largest = {name: np.max(drift, axis=0)[1:].tolist() for name, drift in drifts.items()}
+    numbers = {"date": f"{date.today()}", "versions": versions, "rows": rows, "drifts": largest}
+    NUMBERS.write_text(f"{json.dumps(numbers, indent=1)}\n", "utf-8")
+    PAGE.write_text(written(PAGE.read_text("utf-8"), numbers), "utf-8")
+    draw(drifts)
+
+
+if __name__ == "__main__":
+    main()
