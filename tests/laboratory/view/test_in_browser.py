@@ -101,6 +101,7 @@ def test_the_scenes_time_moves_the_plots_and_a_click_on_a_plot_the_scene(tab: An
 
 def test_legends_have_the_values_at_the_scenes_time(tab: Any, page: str) -> None:
     """With units, and nothing of them is cut."""
+    tab.ask("Input.dispatchMouseEvent", type="mouseMoved", x=1, y=1)  # off the plots
     data = plot_data(page)
     usual = [plot for plot in data["plots"] if plot["shown"]]
     for seconds in (1.0, 3.0):
