@@ -87,7 +87,7 @@ def film() -> None:
         images = []
         for k in range(FRAMES):
             tab.value(f"spaceRobot.seek({first + k / FRAMES * (last - first)})")
-            time.sleep(DRAWN_S if k else LIGHT_S)
+            time.sleep(DRAWN_S if k else 3.0 * LIGHT_S)  # labels are late, too
             images.append(Image.open(io.BytesIO(tab.picture())).convert("RGB").crop(CUT))
     images[0].save(
         FILM,
@@ -96,7 +96,6 @@ def film() -> None:
         duration=round(1e3 * FRAME_S),
         loop=0,
         quality=QUALITY,
-        method=6,
     )
 
 
