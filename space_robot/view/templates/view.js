@@ -98,7 +98,7 @@ function tellValues(u) {
 }
 
 // Letters of the longest entry of a legend: its columns are so wide, and nothing moves.
-const widthOf = (plot) => Math.max(...plot.series.map((s) => s.label.length)) + plot.unit.length + 9;
+const widthOf = (plot) => Math.max(...plot.series.map((s) => s.label.length)) + plot.unit.length + 8;
 
 let zooming = false;
 const drawn = new Map(); // of the plots that are shown, in any order
