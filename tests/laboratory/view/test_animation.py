@@ -101,7 +101,6 @@ def test_the_poses_on_the_page_are_the_bags(flown: Flown) -> None:
 
 
 def test_the_first_camera_sees_all_bodies_in_all_frames(paper_robot: Robot) -> None:
-    """In a window that is hardly wider than high, of a robot that jumps about."""
     log = moving_log(paper_robot, 40, period_ns=100_000_000)
     log.base_position[:] = np.random.default_rng(5).uniform(-2.0, 2.0, (40, 3))
     scene, camera = Scene(page_of(paper_robot, one=log)), dict[str, Any]()

@@ -103,10 +103,10 @@ def test_legends_have_the_values_at_the_scenes_time(tab: Any, page: str) -> None
     """With units, and nothing of them is cut."""
     tab.ask("Input.dispatchMouseEvent", type="mouseMoved", x=1, y=1)  # off the plots
     data = plot_data(page)
-    usual = [plot for plot in data["plots"] if plot["shown"]]
+    shown = (plot for plot in data["plots"] if plot["shown"])
     seek(tab, 3.0)
     row = int(np.searchsorted(data["time"], tab.value("spaceRobot.time()"), "right")) - 1
-    for plot, texts in zip(usual, tab.value(LEGENDS), strict=True):
+    for plot, texts in zip(shown, tab.value(LEGENDS), strict=True):
         for series, text in zip(plot["series"], texts, strict=True):
             number, unit = text[1].split(" ", 1)
             assert (text[0], unit) == (series["label"], plot["unit"])

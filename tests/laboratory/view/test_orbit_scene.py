@@ -387,7 +387,6 @@ def test_in_orbit_the_camera_sees_every_point_and_the_earth_below(
 
 @pytest.mark.parametrize("turned_deg", [30.0, -30.0])
 def test_the_camera_does_not_see_a_panel_from_its_edge(turned_deg: float) -> None:
-    """One of them is the plane that the usual direction lies in, the other one is mirrored."""
     turn = Rotation.from_euler("z", turned_deg, degrees=True).as_matrix()
     wing = Visual("box", (3.0, 0.02, 1.0), turn)
     robot = replace(find_robot("paper"), visuals=(wing,))
