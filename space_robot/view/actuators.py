@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
 from space_robot_model.hardware.base_actuators import BaseActuatorSettings, WheelSettings
 from space_robot_model.robot import Robot
@@ -34,6 +35,9 @@ LARGEST_TURN = 0.5
 """Largest turn from one frame to the next, rad: with larger ones it would seem to turn back."""
 RADIUS, WIDTH = 0.13, 0.045
 """Of a wheel, relative to the size of the base."""
+RIM_POINTS, WHEEL_RINGS = 36, (0.5, 1.0)
+"""Points around a wheel that must be outside of the base, and their distances from its axis,
+relative to its radius."""
 STEP = 2.0**-14
 """Resolution of the drawn attitudes, which keeps the page small."""
 AT_LIMIT = 1.0 - 1e-3
@@ -190,13 +194,19 @@ def _shining(plume: GlbHandle, lengths: Array) -> Move:
 def wheel_places(surface: BaseSurface, com: Array, axes: Array) -> Array:
     """Return where wheels with these unit axes (W, 3) are drawn, (W, 3) m, base frame.
 
-    Wheels on a common axis through the centre of mass are one behind the other.
+    No part of them is in the base. Wheels on a common axis through the centre of mass are one
+    behind the other.
     """
     places = np.empty_like(axes)
+    angles = np.linspace(0.0, 2.0 * np.pi, RIM_POINTS, endpoint=False)
+    circle = np.column_stack([np.cos(angles), np.sin(angles), 0.0 * angles])
+    points = np.concatenate([share * RADIUS * surface.size * circle for share in WHEEL_RINGS])
     for number, axis in enumerate(axes):
         behind = int(np.count_nonzero(np.abs(axes[:number] @ axis) > 0.99))
-        away = surface.distance(com, axis) + (0.6 + 1.4 * behind) * WIDTH * surface.size
-        places[number] = com + away * axis
+        turn, _ = Rotation.align_vectors([axis], [[0.0, 0.0, 1.0]])
+        starts = [com, *(com + turn.apply(points))]
+        away = max(surface.distance(start, axis) for start in starts)
+        places[number] = com + (away + (0.6 + 1.4 * behind) * WIDTH * surface.size) * axis
     return places
 
 

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 POSES = 12
-"""Number of poses of a flight that the initial camera must contain."""
+"""Number of poses of a flight from which the side of the initial camera is chosen."""
 GAP = 0.15
 """Gap between robots side by side, relative to their width."""
 GHOST = 0.4
@@ -88,8 +88,11 @@ class _SampledFlight:
         self.frames = Frames.of(log, robot, times, self._wanted and self._wanted[1])
         rows = np.linspace(0, len(times) - 1, POSES).round().astype(int)
         self.poses = self.frames.base_quaternion[rows], self.frames.joint_positions[rows]
-        self.points = extent(robot, self.frames.base_position[rows], *self.poses)
-        """(K, 3) m, what the camera must see of the robot."""
+        frames = self.frames
+        self.points = extent(
+            robot, frames.base_position, frames.base_quaternion, frames.joint_positions
+        )
+        """(K, 3) m, what the initial camera sees of the robot: all its boxes in all frames."""
         self.size = float(np.ptp(self.points, axis=0).max())
         self.place = np.zeros(3)
         """(3,) m, of its frame in the scene."""

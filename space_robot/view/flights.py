@@ -18,7 +18,6 @@ from space_robot_model.robot.find import find_robot, robot_as_path
 from space_robot_model.robot.parts import Spring
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.bag.law_history import LawChange, as_data, in_words, laws_of
-from space_robot_msgs_py.config.text import shortened
 from space_robot_msgs_py.errors import InputError
 from space_robot_sim.environment.events import Capture
 from space_robot_sim.faults.grammar import parse_fault
@@ -39,8 +38,6 @@ Array = NDArray[np.float64]
 
 STRETCHES = 400
 """Time intervals of a flight; minimum and maximum of each are drawn, so that chatter is visible."""
-MOST_LETTERS = 40
-"""Maximum length of a label, in characters."""
 
 
 @dataclass(frozen=True)
@@ -241,8 +238,7 @@ def flight_plots(
             if is_one:
                 series = list(_axis_series(log, quantity, colours, edges))
             else:
-                label = shortened(name, MOST_LETTERS)
-                series = [Series(label, colour, extremes(log, quantity.size, edges))]
+                series = [Series(name, colour, extremes(log, quantity.size, edges))]
             key = quantity.title, quantity.unit
             # of several flights sizes are drawn, which only errors have limits of
             sides = (1.0,) if quantity.is_error else (-1.0, 1.0) if is_one else ()
@@ -263,11 +259,10 @@ def _axis_series(
     log: FlightLog, quantity: PlottedQuantity, colours: Sequence[str], edges: Array
 ) -> Iterator[Series]:
     for axis, (label, colour) in enumerate(zip(quantity.labels, cycle(colours), strict=False)):
-        text = shortened(label, MOST_LETTERS)
-        yield Series(text, colour, extremes(log, quantity.values[:, axis], edges))
+        yield Series(label, colour, extremes(log, quantity.values[:, axis], edges))
         if quantity.wanted is not None:
             wanted = extremes(log, quantity.wanted[:, axis], edges)
-            yield Series(f"{text}, desired", colour, wanted, True)
+            yield Series(f"{label}, desired", colour, wanted, True)
 
 
 def extremes(log: FlightLog, values: Array, edges: Array) -> Array:

@@ -20,6 +20,7 @@ from space_robot_model.robot.placements import (
     joint_transforms,
     tool_transforms,
 )
+from space_robot_model.robot.shapes import LINK_COLOUR
 
 from .meshes import Mesh
 from .shapes import drawn_parts, shown_shapes
@@ -32,8 +33,6 @@ RGB = tuple[int, int, int]
 
 AXES = 0.08
 """Length of a tool's axes relative to that of all links."""
-GREY = (0.7, 0.7, 0.7, 1.0)
-"""Colour of shapes without a colour."""
 ON_DARK = ("#56B4E9", "#E98FC0", "#2CC295", "#E69F00", "#F0E442", "#FF7F41")
 ON_WHITE = ("#0072B2", "#CC79A7", "#009E73", "#E69F00", "#8A7F00", "#D55E00")
 """Colours of Okabe and Ito, adapted to dark and light pages; flights have the first ones."""
@@ -149,7 +148,7 @@ def add_shape(
     scene: SceneApi, path: str, shape: Visual, style: SceneStyle = PLAIN, mesh: Mesh | None = None
 ) -> SceneNodeHandle:
     """Draw a shape as a node of the scene; ``mesh`` is its file's, if it has one."""
-    colour = shape.colour or GREY
+    colour = shape.colour or LINK_COLOUR
     pose: dict[str, Any] = {
         "position": shape.position,
         "wxyz": quaternion_of_rotation(shape.rotation),

@@ -1,13 +1,14 @@
 """What is drawn of a robot: shapes of its file with their meshes, else foil, panels and tubes.
 
 Derived shapes fill the boxes that masses and inertias give: foil on the base, solar cells on flat
-bodies and plates. What a robot's file draws is not changed.
+bodies and plates. What a robot's file draws keeps its form, and its colour if it has one.
 """
 
 from __future__ import annotations
 
 import zipfile
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
 from typing import NamedTuple
@@ -18,7 +19,13 @@ from numpy.typing import NDArray
 from space_robot_model.robot import Robot
 from space_robot_model.robot.parts import Colour, Plate, Visual
 from space_robot_model.robot.placements import base_axes, body_frames
-from space_robot_model.robot.shapes import BASE_COLOUR, PANEL_COLOUR, drawn_shapes, shapes_of
+from space_robot_model.robot.shapes import (
+    BASE_COLOUR,
+    LINK_COLOUR,
+    PANEL_COLOUR,
+    drawn_shapes,
+    shapes_of,
+)
 
 from .meshes import Mesh, foil, frame, mesh_arrays, panel
 
@@ -87,7 +94,21 @@ def shown_shapes(robot: Robot) -> Shapes:
         drawn += [shape for shape in drawn_shapes(robot) if shape.body in bare]
     if not robot.visuals:
         drawn += plate_panels(robot, drawn)
-    return Shapes(tuple(drawn), meshes, remarks)
+    coloured = (shape if shape.colour else _coloured(shape, robot.n) for shape in drawn)
+    return Shapes(tuple(coloured), meshes, remarks)
+
+
+def _coloured(shape: Visual, joints: int) -> Visual:
+    """Return a shape without a colour as metal on arms, else as solar cells or foil."""
+    if 0 < shape.body <= joints:
+        return replace(shape, colour=LINK_COLOUR)
+    is_panel = shape.body or _is_flat(shape)
+    return replace(shape, colour=PANEL_COLOUR if is_panel else BASE_COLOUR)
+
+
+def _is_flat(shape: Visual) -> bool:
+    thinnest, *others = sorted(shape.size)
+    return shape.shape == "box" and thinnest < FLAT * others[0]
 
 
 @lru_cache(maxsize=32)
@@ -176,8 +197,7 @@ def drawn_parts(shape: Visual) -> list[ShapePart]:
             ShapePart("foil", foil(size - 2.0 * INSET * width), shape.colour),
             ShapePart("frame", frame(size, width), FRAME_COLOUR),
         ]
-    thinnest, next_one, _ = np.sort(size)
-    if shape.colour == PANEL_COLOUR and thinnest < FLAT * next_one:
+    if shape.colour == PANEL_COLOUR and _is_flat(shape):
         back, cells = panel(size)
         return [ShapePart("back", back, BACK_COLOUR), ShapePart("cells", cells, CELL_COLOUR)]
     return []

@@ -18,7 +18,7 @@ from space_robot_msgs_py.config.installation import install_command
 from space_robot_msgs_py.errors import InputError
 
 from .orbit import OrbitFrames
-from .shapes import BaseSurface
+from .shapes import BaseSurface, bounding_boxes
 
 if TYPE_CHECKING:
     from viser import DirectionalLightHandle, SceneApi, ViserServer
@@ -50,6 +50,8 @@ STEEPEST = np.radians(30.0)
 """Largest elevation of the initial camera in orbit."""
 MOST_HIDDEN = 0.25
 """Share of the arms that the base may hide from the initial camera."""
+LARGE = 0.8
+"""Seen area of a robot from the initial camera, relative to that from the best of `SIDES`."""
 
 
 def check_viser() -> None:
@@ -103,11 +105,14 @@ def set_stage(
     middle, size = 0.5 * (low + high), max(float(np.linalg.norm(high - low)), 0.1)
     earth_at = DISTANCE * size
     stars_at = BEHIND * earth_at if orbit else STARS_AT * size
+    length = 10.0 ** np.floor(np.log10(0.5 * size))
     corner = low - 0.05 * size
+    if side[1] < 0.0:  # the camera is behind: this corner is the left one there
+        corner[:2] = high[:2] + 0.05 * size - length
     if orbit:
         corner[2] = middle[2]  # above the Earth
         points = np.vstack([points, corner])
-    _add_inertial_axes(scene, size, axes @ corner)
+    _add_inertial_axes(scene, size, length, axes @ corner)
     directions = unit_rows(np.random.default_rng(STAR_SEED).normal(size=(STARS, 3)))
     scene.add_point_cloud(  # makes rotation visible
         "/stars",
@@ -140,9 +145,8 @@ def camera_direction(side: Array, orbit: OrbitFrames | None) -> Array:
     return np.asarray(orbit.axes @ [*np.cos(elevation) * aside, np.sin(elevation)])
 
 
-def _add_inertial_axes(scene: SceneApi, size: float, corner: Array) -> None:
+def _add_inertial_axes(scene: SceneApi, size: float, length: float, corner: Array) -> None:
     """Draw inertial axes of a round length, which make drift and rotation visible."""
-    length = 10.0 ** np.floor(np.log10(0.5 * size))
     scene.add_frame(
         "/inertial",
         axes_length=length,
@@ -190,16 +194,36 @@ def clearest_side(
 ) -> Array:
     """Return the first of `SIDES` where the base hides at most `MOST_HIDDEN` of the arms.
 
-    Or, if there is none, the one where it hides least. The flights are robots with the attitudes
+    Sides where much of the robot is seen, panels not from their edges, come first. If there is no
+    such side it is the one where the base hides least. The flights are robots with the attitudes
     (T, 4) of their bases and the positions (T, N) of all their joints, rad or m.
     """
+    directions = np.array([camera_direction(side, orbit) for side in SIDES])
+    areas = np.sum([_seen_areas(*flight, directions) for flight in flights], axis=0)
+    order = np.argsort(areas < LARGE * areas.max(), kind="stable")
     shares = []
-    for side in SIDES:
-        direction = camera_direction(side, orbit)
+    for direction in directions[order]:
         shares.append(float(np.mean([_hidden_share(*flight, direction) for flight in flights])))
         if shares[-1] <= MOST_HIDDEN:
             break
-    return np.asarray(SIDES[int(np.argmin(shares))])
+    return np.asarray(SIDES[order[int(np.argmin(shares))]])
+
+
+def _seen_areas(
+    robot: Robot, quaternion: Array, joint_positions: Array, directions: Array
+) -> Array:
+    """Return the mean areas, m2, of a robot's boxes from some directions (D, 3)."""
+    frames = {
+        frame.body: frame
+        for frame in body_frames(robot, base_axes(quaternion.T), joint_positions.T)
+    }
+    areas = np.zeros(len(directions))
+    for box in bounding_boxes(robot):
+        for axis, normal in enumerate(box.shape.rotation.T):
+            face = 4.0 * float(np.prod(np.delete(box.half, axis)))
+            seen = directions @ frames[box.shape.body].on_outer_axes(normal)
+            areas += face * np.abs(seen).mean(axis=1)
+    return areas
 
 
 def _hidden_share(

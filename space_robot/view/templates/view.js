@@ -70,11 +70,12 @@ function drawTime(u) {
 
 const sync = uPlot.sync("flight");
 const axis = { stroke: colourOf("faint"), grid: { stroke: colourOf("line"), width: 1 }, ticks: { stroke: colourOf("line") } };
-const vertical = { ...axis, size: 58, space: 18, values: (_, v) => v.map(number) };
+const vertical = { ...axis, size: 64, space: 18, values: (_, v) => v.map(number) };
 
 // Of pulses each series has a row, numbered from the top, and fills it while it is open.
 const ROW = 0.8;
-const share = (plot, k) => (_, v) => number(v == null || !plot.pulses ? v : (v + k) / ROW);
+const share = (plot, k, v) => number(v == null || !plot.pulses ? v : (v + k) / ROW);
+const valueOf = (plot, k) => (_, v) => `${share(plot, k, v)} ${v == null ? "" : plot.unit}`.trim();
 const curve = (plot, k) => (plot.pulses ? plot.series[k].values.map((v) => (v == null ? v : ROW * v - k)) : plot.series[k].values);
 const heightOf = (plot) => (plot.pulses ? Math.max(150, 50 + 12 * plot.series.length) : 150);
 
@@ -89,6 +90,16 @@ function axisOf(plot) {
   return { ...vertical, splits: plot.series.map((_, k) => -k).reverse(), filter: (_, v) => v, values: (_, v) => v.map((row) => `${1 - row}`) };
 }
 
+// A legend has the values at the pointer, or else at the scene's time.
+function tellValues(u) {
+  if (u.cursor.left >= 0) return;
+  const after = times.findIndex((t) => t > time);
+  u.setLegend({ idx: after < 0 ? times.length - 1 : Math.max(after - 1, 0) });
+}
+
+// Letters of the longest entry of a legend: its columns are so wide, and nothing moves.
+const widthOf = (plot) => Math.max(...plot.series.map((s) => s.label.length)) + plot.unit.length + 8;
+
 let zooming = false;
 const drawn = new Map(); // of the plots that are shown, in any order
 const place = document.getElementById("plots");
@@ -99,6 +110,7 @@ function draw(plot, box) {
   const heading = document.createElement("h2");
   heading.textContent = plot.unit ? `${plot.title} (${plot.unit})` : plot.title;
   box.append(heading);
+  box.style.setProperty("--letters", widthOf(plot));
   const zoomed = (u, scale) => {
     if (scale !== "x" || zooming) return;
     zooming = true; // all plots show the same stretch
@@ -113,16 +125,17 @@ function draw(plot, box) {
       cursor: { sync: { key: sync.key } },
       axes: [{ ...axis, size: 24, values: (_, v) => v.map((x) => `${x}`) }, axisOf(plot)],
       series: [
-        { label: "s", value: (_, v) => number(v) },
+        {},
         ...plot.series.map((s, k) => ({
-          label: s.label, stroke: s.colour, width: 1, value: share(plot, k), ...(s.wanted && { class: "wanted", dash: [4, 4] }),
+          label: s.label, stroke: s.colour, width: 1, value: valueOf(plot, k), ...(s.wanted && { class: "wanted", dash: [4, 4] }),
         })),
       ],
-      hooks: { drawAxes: [drawMarks], draw: [(u) => drawLimits(u, plot.limits), drawTime], setScale: [zoomed] },
+      hooks: { drawAxes: [drawMarks], draw: [(u) => drawLimits(u, plot.limits), drawTime], setScale: [zoomed], setCursor: [tellValues] },
     },
     [times, ...plot.series.map((_, k) => curve(plot, k))],
     box,
   );
+  tellValues(u);
   if (shown) u.setScale("x", { min: shown.scales.x.min, max: shown.scales.x.max });
   let pressed = 0;
   u.over.addEventListener("mousedown", (event) => (pressed = event.clientX));
@@ -229,7 +242,7 @@ function follow() {
   const moved = () => {
     time = start + Number(thumb.getAttribute("aria-valuenow"));
     tell();
-    drawn.forEach((u) => u.redraw(false));
+    drawn.forEach((u) => (u.redraw(false), tellValues(u)));
   };
   new MutationObserver(moved).observe(thumb, { attributes: true, attributeFilter: ["aria-valuenow"] });
   moved();

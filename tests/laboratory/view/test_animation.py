@@ -100,6 +100,24 @@ def test_the_poses_on_the_page_are_the_bags(flown: Flown) -> None:
     assert any(n.startswith(f"/one/trail_{robot.tool.name}/") for n in scene.names())
 
 
+def test_the_first_camera_sees_all_bodies_in_all_frames(paper_robot: Robot) -> None:
+    log = moving_log(paper_robot, 40, period_ns=100_000_000)
+    log.base_position[:] = np.random.default_rng(5).uniform(-2.0, 2.0, (40, 3))
+    scene, camera = Scene(page_of(paper_robot, one=log)), dict[str, Any]()
+    for _, message in scene.messages:
+        camera |= message if message["type"].startswith("SetCamera") else {}
+    position, target = np.array(camera["position"]), np.array(camera["look_at"])
+    ahead = (target - position) / np.linalg.norm(target - position)
+    right = np.cross(ahead, [0.0, 0.0, 1.0])
+    right /= np.linalg.norm(right)
+    slope = np.tan(0.5 * camera["fov"])
+    for time in log.time:
+        poses = scene.poses(float(time) + 1e-6)
+        away = np.array([p.position for n, p in poses.items() if "base_link" in n]) - position
+        assert (np.abs(away @ right) < 1.1 * slope * (away @ ahead)).all()
+        assert (np.abs(away @ np.cross(right, ahead)) < slope * (away @ ahead)).all()
+
+
 def test_the_poses_of_a_tree_with_all_kinds_of_joints() -> None:
     rng = np.random.default_rng(5)
     kinds = ["revolute", "prismatic", "passive revolute", "fixed", "passive prismatic", "revolute"]

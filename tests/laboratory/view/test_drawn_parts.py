@@ -15,11 +15,13 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scene_pages import Scene, moving_log, page_of
 from scipy.integrate import cumulative_trapezoid
+from scipy.spatial.transform import Rotation
 
 from space_robot.view import shapes
 from space_robot.view.actuators import (
     FASTEST,
     LARGEST_TURN,
+    RADIUS,
     SATURATED,
     SHORTEST,
     STEP,
@@ -44,8 +46,9 @@ from space_robot.view.shapes import (
 from space_robot_control.allocation.settings import assumed_actuators
 from space_robot_model.hardware.base_actuators import BaseActuatorSettings, WheelSettings
 from space_robot_model.robot import Robot
+from space_robot_model.robot.find import find_robot
 from space_robot_model.robot.parts import Plate, Visual
-from space_robot_model.robot.shapes import BASE_COLOUR, PANEL_COLOUR
+from space_robot_model.robot.shapes import BASE_COLOUR, LINK_COLOUR, PANEL_COLOUR
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.samples import RobotNames, Timebase
 
@@ -109,6 +112,17 @@ def test_what_a_file_draws_is_left_alone() -> None:
     assert drawn_parts(sphere) == []
 
 
+def test_shapes_of_a_urdf_without_a_colour_look_like_a_satellite() -> None:
+    """Foil on the base, cells on what is flat, metal on the arm; a material wins."""
+    hull, wing = box((1.0, 1.0, 1.2), None), box((2.0, 1.0, 0.02), None)
+    red = replace(hull, colour=(1.0, 0.0, 0.0, 1.0))
+    robot = replace(find_robot("dual_arm"), visuals=(hull, wing, replace(hull, body=1), red))
+    shapes = shown_shapes(robot).shapes
+    assert [shape.colour for shape in shapes[:3]] == [BASE_COLOUR, PANEL_COLOUR, LINK_COLOUR]
+    assert shapes[3].colour == red.colour
+    assert [len(drawn_parts(shape)) for shape in shapes] == [2, 2, 0, 0]
+
+
 def test_plates_beside_the_base_are_panels_of_their_area(paper_robot: Robot) -> None:
     up, aside = np.array([0.0, 0.0, 1.0]), np.array([0.0, 2.0, 0.0])
     plates = (
@@ -153,7 +167,7 @@ def test_a_body_whose_meshes_cannot_be_read_is_drawn_from_its_numbers(
     broken.write_text("solid nothing\nendsolid nothing\n")
     told = (visual(ball, 1), visual(broken, 1), visual(lacking, 3))
     found = shown_shapes(replace(paper_robot, visuals=told))
-    assert found.shapes[0] == told[0]
+    assert (found.shapes[0].mesh, found.shapes[0].colour) == (str(ball), LINK_COLOUR)
     assert {shape.body for shape in found.shapes[1:]} == {3}
     assert all(shape.shape == "cylinder" for shape in found.shapes[1:])
     for remark, file in zip(found.remarks[-2:], (broken, lacking), strict=True):
@@ -248,6 +262,18 @@ def test_wheels_are_at_the_corners_and_those_of_one_axis_behind_one_another(
     first, second, opposite = wheel_places(surface, com, along_z)
     assert edge < first[2] < second[2]
     assert opposite[2] < -edge
+
+
+def test_no_part_of_a_wheel_is_in_a_long_base() -> None:
+    base = Visual("box", (3.0, 1.0, 0.6), position=np.array([0.1, 0.0, 0.0]))
+    robot = replace(find_robot("dual_arm"), visuals=(base,))
+    surface, turns = BaseSurface(robot), Rotation.random(20, rng=2)
+    angles = np.linspace(0.0, 6.0, 12)
+    rim = RADIUS * surface.size * np.column_stack([np.cos(angles), np.sin(angles), 0.0 * angles])
+    places = wheel_places(surface, robot.com[0], turns.apply([0.0, 0.0, 1.0]))
+    for turn, place in zip(turns, places, strict=True):
+        away = np.abs(place + turn.apply(rim) - base.position)
+        assert (away > 0.5 * np.array(base.size)).any(axis=1).all()
 
 
 def test_the_page_turns_the_wheels_and_colours_those_at_a_limit(paper_robot: Robot) -> None:

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from paths import DOCS
 from PIL import Image
-from scene_pages import page_of
+from scene_pages import page_of, plot_data
 
 from space_robot import Scenario
 from space_robot_model.robot import Robot
@@ -33,20 +33,29 @@ STANDS = """(async () => {
     return spaceRobot.time() === before;
 })()"""
 SCENE = 'document.getElementById("scene").contentDocument'
+LEGENDS = """[...document.querySelectorAll("#plots .u-legend")].map(
+    (legend) => [...legend.querySelectorAll(".u-series")].slice(1).map(
+        (row) => [".u-label", ".u-value"].map((name) => row.querySelector(name).innerText)))"""
 HEADINGS = '[...document.querySelectorAll("#plots h2")].map((h) => h.innerText)'
 
 
 @pytest.fixture(scope="module")
-def tab(tmp_path_factory: pytest.TempPathFactory, paper_robot: Robot) -> Iterator[Any]:
+def page(paper_robot: Robot) -> str:
     """The page of a flight in orbit, by day, with a fault."""
+    log = Scenario(duration=4.0, orbit="iss", faults=["drive_scale@2-3:all=0.9"]).fly().log
+    return page_of(paper_robot, one=log)
+
+
+@pytest.fixture(scope="module")
+def tab(tmp_path_factory: pytest.TempPathFactory, page: str) -> Iterator[Any]:
+    """The page in a browser."""
     sys.path.insert(0, str(DOCS))
     from devtools import Browser, chromium
 
     if chromium() is None:
         pytest.skip("needs Chromium")
     file = tmp_path_factory.mktemp("page") / "page.html"
-    log = Scenario(duration=4.0, orbit="iss", faults=["drive_scale@2-3:all=0.9"]).fly().log
-    file.write_text(page_of(paper_robot, one=log), "utf-8")
+    file.write_text(page, "utf-8")
     with Browser() as browser:
         tab = browser.tab(480, 400)
         tab.open(file.as_uri())
@@ -88,6 +97,22 @@ def test_the_scenes_time_moves_the_plots_and_a_click_on_a_plot_the_scene(tab: An
     for kind in ("mouseMoved", "mousePressed", "mouseReleased"):
         tab.ask("Input.dispatchMouseEvent", type=kind, x=x, y=y, button="left", clickCount=1)
     tab.wait("Math.abs(spaceRobot.time() - 2) < 0.02")
+
+
+def test_legends_have_the_values_at_the_scenes_time(tab: Any, page: str) -> None:
+    """With units, and nothing of them is cut."""
+    tab.ask("Input.dispatchMouseEvent", type="mouseMoved", x=1, y=1)  # off the plots
+    data = plot_data(page)
+    shown = (plot for plot in data["plots"] if plot["shown"])
+    seek(tab, 3.0)
+    row = int(np.searchsorted(data["time"], tab.value("spaceRobot.time()"), "right")) - 1
+    for plot, texts in zip(shown, tab.value(LEGENDS), strict=True):
+        for series, text in zip(plot["series"], texts, strict=True):
+            number, unit = text[1].split(" ", 1)
+            assert (text[0], unit) == (series["label"], plot["unit"])
+            assert float(number) == pytest.approx(series["values"][row], rel=0.051)
+    cut = "(e) => e.scrollWidth > e.clientWidth + 1"
+    assert not tab.value(f'[...document.querySelectorAll(".u-series > *")].some({cut})')
 
 
 def test_a_click_on_a_mark_goes_there_and_what_goes_on_is_told(tab: Any) -> None:

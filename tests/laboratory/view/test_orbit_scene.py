@@ -39,6 +39,8 @@ from space_robot.view.orbit import (
 from space_robot.view.scene import local_server, turns_from_z
 from space_robot.view.stage import DIRECTION, FIELD_OF_VIEW, LAMPS, SIDES, clearest_side, set_stage
 from space_robot_model.robot import Robot
+from space_robot_model.robot.find import find_robot
+from space_robot_model.robot.parts import Visual
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.samples import ORBIT_FIELDS
 
@@ -381,6 +383,16 @@ def test_in_orbit_the_camera_sees_every_point_and_the_earth_below(
     _, above, away = axes @ limb
     assert -1.0 < above / away / np.tan(0.5 * FIELD_OF_VIEW) < -0.2
     assert far > 2.0 * stage.earth_distance > 5000.0 * stage.size
+
+
+@pytest.mark.parametrize("turned_deg", [30.0, -30.0])
+def test_the_camera_does_not_see_a_panel_from_its_edge(turned_deg: float) -> None:
+    turn = Rotation.from_euler("z", turned_deg, degrees=True).as_matrix()
+    wing = Visual("box", (3.0, 0.02, 1.0), turn)
+    robot = replace(find_robot("paper"), visuals=(wing,))
+    side = clearest_side([(robot, np.eye(4)[:1], np.zeros((1, robot.joint_count)))])
+    back = DIRECTION * side / np.linalg.norm(DIRECTION)
+    assert abs(back @ wing.rotation[:, 1]) > 0.9
 
 
 @pytest.mark.parametrize(("name", "side"), [("paper", 1.0), ("canadarm", -1.0), ("canadarm2", 1.0)])
