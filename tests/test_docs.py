@@ -41,8 +41,8 @@ WITHOUT_PICTURE = {
         "measurements/reality"
     ),
     "steps and commands": (
-        "manual/cluster manual/flight_code manual/frameworks manual/installation manual/launch "
-        "manual/namespaces manual/replay manual/requirements manual/ros manual/security "
+        "manual/cluster manual/flight_code manual/frameworks manual/in_flight manual/installation "
+        "manual/launch manual/namespaces manual/replay manual/requirements manual/ros manual/security "
         "manual/urdf manual/viewers"
     ),
     "about code, which it shows, or numbers of a few runs": (
