@@ -42,8 +42,8 @@ WITHOUT_PICTURE = {
     ),
     "steps and commands": (
         "manual/cluster manual/flight_code manual/frameworks manual/in_flight manual/installation "
-        "manual/launch manual/namespaces manual/replay manual/requirements manual/ros manual/security "
-        "manual/urdf manual/viewers"
+        "manual/launch manual/namespaces manual/replay manual/requirements manual/ros "
+        "manual/security manual/urdf manual/viewers"
     ),
     "about code, which it shows, or numbers of a few runs": (
         "explanation/gpu explanation/kernels explanation/one_law_three_times "

@@ -125,8 +125,15 @@ def block(page: str, name: str) -> str:
 
 def write(name: str) -> Path:
     """Draw a picture and write its SVG into this folder."""
+    path = FOLDER / f"{name}.svg"
+    path.write_text(as_svg(PICTURES[name]()), "utf-8")
+    return path
+
+
+def as_svg(figure: Figure) -> str:
+    """Return a figure as SVG, with colours for both schemes."""
     file = io.StringIO()
-    PICTURES[name]().savefig(file, format="svg")
+    figure.savefig(file, format="svg")
     text = re.sub(r"<metadata>.*?</metadata>", "", file.getvalue(), flags=re.DOTALL)
     text = re.sub(r"<[^>]*>", _shortened, text)
     for number, colour in enumerate(COLOURS, start=1):
@@ -136,10 +143,7 @@ def write(name: str) -> Path:
         for k in (0, 1)
     )
     style = f"<style>{FONTS}{light}@media (prefers-color-scheme:dark){{{dark}}}</style>"
-    text = re.sub(r"(<svg [^>]*>)", rf"\1\n{style}", text, count=1)
-    path = FOLDER / f"{name}.svg"
-    path.write_text(text, "utf-8")
-    return path
+    return re.sub(r"(<svg [^>]*>)", rf"\1\n{style}", text, count=1)
 
 
 def _shortened(tag: re.Match[str]) -> str:

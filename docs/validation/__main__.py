@@ -107,37 +107,19 @@ def table(head: Sequence[str], rows: Sequence[list[str]]) -> str:
 
 def draw(drifts: dict[str, Array]) -> None:
     """Draw the drift of angular momentum over time."""
-    import matplotlib as mpl
-    from matplotlib.figure import Figure
+    sys.path.append(str(DOCS / "pictures"))
+    import theme
 
-    style = {"svg.fonttype": "none", "svg.hashsalt": "validation", "font.size": 12}
-    names = "text.color", "axes.edgecolor", "axes.labelcolor", "xtick.color", "ytick.color"
-    with mpl.rc_context({**style, **dict.fromkeys(names, INK), "font.family": "sans-serif"}):
-        figure = Figure(figsize=(6.4, 3.8), layout="constrained")
-        axes = figure.subplots()
-        shown = [name for name in drifts if "fast" not in name]  # the same line as Euler's
-        for name, colour in zip(shown, LINES, strict=True):
-            time_s, drift = drifts[name][:, [0, 2]].T
-            label = f"{name}, implicitfast" if name.endswith("Euler") else name
-            axes.semilogy(time_s, drift, color=colour, linewidth=2.0, label=label)
-        axes.grid(color=FAINT)
-        axes.spines[["top", "right"]].set_visible(False)
-        labels = {"xlabel": "time (s)", "ylabel": "drift of angular momentum"}
-        axes.set(**labels, xlim=(0, 600), ylim=(1e-15, 1.0))
-        axes.legend(frameon=False, loc="center", bbox_to_anchor=(0.5, 0.57))
-        figure.savefig(PICTURE, transparent=True, metadata={"Date": None})
-    PICTURE.write_text(themed(PICTURE.read_text("utf-8")), "utf-8")
-
-
-def themed(svg: str) -> str:
-    """Return a picture with the colours of `THEME`, by the reader's light or dark scheme."""
-    light, dark = (
-        ";".join(f"--c{colour[1:]}:{pair[k]}" for colour, pair in THEME.items()) for k in (0, 1)
-    )
-    rules = f"svg{{{light}}}@media (prefers-color-scheme: dark){{svg{{{dark}}}}}"
-    for colour in THEME:
-        svg = svg.replace(colour, f"var(--c{colour[1:]})")
-    return svg.replace("<defs>", f"<style>{rules}</style>\n <defs>", 1)
+    figure, (axes,) = theme.panels()
+    shown = [name for name in drifts if "fast" not in name]  # the same line as Euler's
+    for name, colour in zip(shown, theme.SERIES, strict=True):
+        time_s, drift = drifts[name][:, [0, 2]].T
+        label = f"{name}, implicitfast" if name.endswith("Euler") else name
+        axes.semilogy(time_s, drift, color=colour, label=label)
+    labels = {"xlabel": "time, s", "ylabel": "drift of angular momentum"}
+    axes.set(**labels, xlim=(0, 600), ylim=(1e-15, 1.0))
+    axes.legend(loc="center", bbox_to_anchor=(0.5, 0.57), ncols=1)
+    PICTURE.write_text(theme.as_svg(figure), "utf-8")
 
 
 def main() -> None:
