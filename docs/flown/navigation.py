@@ -5,12 +5,19 @@ from __future__ import annotations
 from base_numbers import ATTITUDE, LAWS
 from flown_tables import Number, Options, Page, Table, Text
 
+from space_robot.api.flown_flight import FlownFlight
+
 GRADES = ("fine", "coarse")
 RIPPLE = "base_torque.ripple"
 SMOOTH = {"controller": {"acceleration_filter_hz": 100.0}}
 DIVERGE = {("fine", "ctc"), ("coarse", "tde_smc"), ("coarse", "tde_tsmc"), ("coarse", "tde_stc")}
 """Without the filter."""
 CORNERS_HZ = ((200.0, 300.0), (50.0, 75.0), (20.0, 30.0), (10.0, 15.0))
+
+
+def ended_at(flown: FlownFlight) -> float:
+    """Return the time of the flight's end, s."""
+    return flown.ended_at_s
 
 
 def _cell(options: Options) -> Text:
@@ -20,7 +27,7 @@ def _cell(options: Options) -> Text:
 def _direct(sensors: str, law: str) -> Text | Number:
     options: Options = {"sensors": sensors, "controller": law}
     if (sensors, law) in DIVERGE:
-        return Text("diverges at {} s", (Number(options, "ended_at_s", ".1f"),))
+        return Text("diverges at {} s", (Number(options, ended_at, ".1f"),))
     if (sensors, law) == ("coarse", "ctc"):  # its ripple is of no use: the attitude is lost
         return Number(options, ATTITUDE, ".1e")
     return _cell(options)
