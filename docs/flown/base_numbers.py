@@ -39,6 +39,11 @@ def pulses(flown: FlownFlight) -> float:
     return float(np.count_nonzero(is_open[1:] & ~is_open[:-1]))
 
 
+def ended_at(flown: FlownFlight) -> float:
+    """Return the time of the flight's end, s."""
+    return flown.ended_at_s
+
+
 def largest_attitude_error(flown: FlownFlight) -> float:
     """Return the largest error of an axis of the vector part from 10 s on."""
     return float(np.max(np.abs(tracking_error(flown.log)[flown.log.time >= 10.0, :3])))

@@ -173,9 +173,9 @@ class Page(NamedTuple):
         stale, flown = set(), {}
         for name, (options, quantities) in flights.items():
             flight = Scenario(**options).check()
-            if kept.get(name, {}).get("settings") != flight_digest(flight) or kept[name][
-                "numbers"
-            ].keys() != {quantity_name(q) for q in quantities}:
+            entry = kept.get(name, {"settings": "", "numbers": {}})
+            wanted = {quantity_name(quantity) for quantity in quantities}
+            if entry["settings"] != flight_digest(flight) or entry["numbers"].keys() != wanted:
                 stale.add(name)
             elif is_flown(name):
                 flown[name] = beginning(options, flight)

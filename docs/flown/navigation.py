@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-from base_numbers import ATTITUDE, LAWS
+from base_numbers import ATTITUDE, LAWS, ended_at
 from flown_tables import Number, Options, Page, Table, Text
-
-from space_robot.api.flown_flight import FlownFlight
 
 GRADES = ("fine", "coarse")
 RIPPLE = "base_torque.ripple"
@@ -13,11 +11,6 @@ SMOOTH = {"controller": {"acceleration_filter_hz": 100.0}}
 DIVERGE = {("fine", "ctc"), ("coarse", "tde_smc"), ("coarse", "tde_tsmc"), ("coarse", "tde_stc")}
 """Without the filter."""
 CORNERS_HZ = ((200.0, 300.0), (50.0, 75.0), (20.0, 30.0), (10.0, 15.0))
-
-
-def ended_at(flown: FlownFlight) -> float:
-    """Return the time of the flight's end, s."""
-    return flown.ended_at_s
 
 
 def _cell(options: Options) -> Text:
