@@ -35,7 +35,7 @@ BEGINNING_TICKS = 60_000
 """Of a longer flight the tests fly no more."""
 SHARE = 3
 """The tests fly one of so many flights."""
-SAME, ROUNDING = 1e-4, 1e-14
+SAME, ROUNDING = 1e-5, 1e-14
 """Relative: less than a page shows; and absolute."""
 NUMBER = r"(-?\d+(?:\.\d+)?(?:e-?\d+)?|-)"
 Quantity = str | Callable[[FlownFlight], float | None]
