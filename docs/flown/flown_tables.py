@@ -245,9 +245,11 @@ def beginning(options: Options, flight: Flight) -> Flight:
 
 
 def fly(flights: Mapping[str, Flight]) -> Iterator[tuple[str, FlownFlight]]:
-    """Fly checked flights, those that can in lanes together; yield each with its name."""
+    """Fly checked flights, short ones in lanes; yield each with its name."""
     names = list(flights)
-    for group in batches(enumerate(flights.values())):
+    short = ((n, own) for n, own in enumerate(flights.values()) if own.ticks <= BEGINNING_TICKS)
+    long = ([(n, own)] for n, own in enumerate(flights.values()) if own.ticks > BEGINNING_TICKS)
+    for group in (*batches(short), *long):  # a long flight alone has its log in a file
         together = [flight for _, flight in group]
         for (number, flight), one in zip(group, fly_group(together), strict=True):
             yield names[number], FlownFlight(flight, one.ending, None, one.log)
