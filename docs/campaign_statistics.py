@@ -1,5 +1,7 @@
 """How often verdicts are false, exactly: `python docs/campaign_statistics.py`.
 
+Writes the table of explanation/campaign_statistics.md, and keeps its numbers beside this file.
+
 The failures are those of independent flights that fail with a probability just too large (for "not
 met": just small enough), the worst case of both. A rule says after which runs one looks, and
 whether one goes on. The probabilities of all numbers of failures are carried from look to look
@@ -8,7 +10,10 @@ whether one goes on. The probabilities of all numbers of failures are carried fr
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import json
+import sys
+from collections.abc import Callable, Mapping
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +28,11 @@ from space_robot.campaign.verdicts.requirements import (
     projected_decision,
 )
 
+sys.path.append(str(Path(__file__).parent / "flown"))
+from marks import markdown, put
+
+PAGE = Path(__file__).parent / "explanation/campaign_statistics.md"
+KEPT = Path(__file__).with_suffix(".json")
 Array = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 SHARE, CONFIDENCE, HALF_WIDTH = 0.997, 0.9, 0.001
@@ -173,17 +183,25 @@ def rules(test: ShareTest) -> dict[str, Callable[[], tuple[float, float]]]:
     return found
 
 
+def renewed(page: str, kept: Mapping[str, list[float | None]]) -> str:
+    """Return the page with the table of what is kept: shares by the name of the rule."""
+    head = ("rule", "order statistics: met", "not met", "sequence: met", "not met")
+    rows = [
+        [name, *("" if e is None else f"{100.0 * e:.1f} %" for e in errors)]
+        for name, errors in kept.items()
+    ]
+    return put(page, "rules", markdown(head, rows))
+
+
 def main() -> None:
-    """Print the table of docs/explanation/campaign_statistics.md."""
-    fixed, sequential = FixedSample(SHARE, CONFIDENCE), Sequential(SHARE, CONFIDENCE)
-    before, now = ({name: r() for name, r in rules(t).items()} for t in (fixed, sequential))
-    print("| rule | order statistics: met | not met | sequence: met | not met |")
-    print("|---|---|---|---|---|")
-    for name, errors in now.items():
-        cells = [f"{100.0 * e:.1f} %" for e in (*before.get(name, ()), *errors)]
-        print(" | ".join([f"| {name}", *([] if name in before else ["", ""]), *cells]) + " |")
-    samples = [f"{100.0 * Rule(test).sampled():.1f} %" for test in (fixed, sequential)]
-    print(f"| the same, {SAMPLES:,} campaigns sampled | {samples[0]} | | {samples[1]} | |")
+    """Run the command."""
+    tests = FixedSample(SHARE, CONFIDENCE), Sequential(SHARE, CONFIDENCE)
+    before, now = ({name: r() for name, r in rules(test).items()} for test in tests)
+    kept = {name: [*before.get(name, (None, None)), *errors] for name, errors in now.items()}
+    fixed, sequence = (Rule(test).sampled() for test in tests)
+    kept[f"the same, {SAMPLES:,} campaigns sampled"] = [fixed, None, sequence, None]
+    KEPT.write_text(json.dumps(kept, indent=1) + "\n", "utf-8")
+    PAGE.write_text(renewed(PAGE.read_text("utf-8"), kept), "utf-8")
 
 
 if __name__ == "__main__":

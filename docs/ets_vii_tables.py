@@ -1,13 +1,12 @@
 """Put tables and figure of flown campaigns into explanation/ets_vii.md.
 
-Run `python docs/ets_vii_tables.py`. The page names the folders: what stands between
-``<!-- begin DIR -->`` and ``<!-- end -->`` is a row for each point of the grid of that folder's
-campaign. Folders that are not there are left out.
+Run `python docs/ets_vii_tables.py`. The table of each of `CAMPAIGNS` has a row for each point of
+the grid of that campaign, flown into `campaigns`. Folders that are not there are left out.
 """
 
 from __future__ import annotations
 
-import re
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
@@ -20,12 +19,15 @@ from numpy.typing import NDArray
 from space_robot import FlownCampaign
 from space_robot.analysis.figures.style import COLOURS, GREY, house_style, page, save_figure
 
+sys.path.append(str(Path(__file__).parent / "flown"))
+from marks import markdown, put
+
 if TYPE_CHECKING:
     from pandas import DataFrame
 
 PAGE = Path(__file__).parent / "explanation/ets_vii.md"
 PICTURE = Path(__file__).with_name("ets_vii")
-BLOCK = re.compile(r"(<!-- begin (\S+) -->\n\n).*?(\n\n<!-- end -->)", re.DOTALL)
+CAMPAIGNS = ("ets_vii", "ets_vii_wheels")
 MISSION, GRADIENT = "vary.scenario.mission", "vary.plant.gravity.gradient"
 DRIFT = "attitude_drift"
 DURATIONS = {"out_and_back": 84.6, "lift": 55.2, "reactionless": 55.2}
@@ -58,14 +60,13 @@ class Point(NamedTuple):
     """(N,) in the unit of the page."""
     worst_run: int
 
-    def line(self, campaign: FlownCampaign, requirement: str) -> str:
-        """Return the row in Markdown."""
+    def row(self, campaign: FlownCampaign, requirement: str) -> list[str]:
+        """Return the row of the table."""
         bound = campaign.study.require[requirement]
         low, middle, high = np.quantile(self.values, [0.05, 0.5, 0.95], method="inverted_cdf")
         numbers = (f"{middle:.3f}", f"{low:.3f} to {high:.3f}", f"{self.values.max():.3f}")
         within = np.count_nonzero(self.values < bound.bound * _metric(campaign).factor)
-        cells = (*self.cells, *numbers, str(self.worst_run), f"{within} of {len(self.values)}")
-        return f"| {' | '.join(cells)} |"
+        return [*self.cells, *numbers, str(self.worst_run), f"{within} of {len(self.values)}"]
 
 
 def points(campaign: FlownCampaign) -> Iterator[Point]:
@@ -92,8 +93,7 @@ def table(campaign: FlownCampaign) -> str:
         "its run",
         f"below {bound:.1f}{space}{unit}",
     )
-    lines = [point.line(campaign, metric.requirement) for point in points(campaign)]
-    return "\n".join([f"| {' | '.join(head)} |", "|---" * len(head) + "|", *lines])
+    return markdown(head, [point.row(campaign, metric.requirement) for point in points(campaign)])
 
 
 @house_style()
@@ -140,16 +140,18 @@ def _cell(value: object) -> str:
     return names.get(text, f"`{text}`")
 
 
-def renewed(found: re.Match[str]) -> str:
-    """Return a block of the page with the table of its folder; as it is if that is not there."""
-    if not Path(found[2]).is_dir():
-        return found[0]
-    campaign = FlownCampaign.open(found[2])
+def renewed(text: str, name: str) -> str:
+    """Return the page with the table of a campaign; as it is if that is not flown."""
+    folder = Path("campaigns", name)
+    if not folder.is_dir():
+        return text
+    campaign = FlownCampaign.open(folder)
     if DRIFT in " ".join(map(str, campaign.table)):
         save_figure(figure(campaign.table), PICTURE)
         PICTURE.with_suffix(".svg").unlink()
-    return f"{found[1]}{table(campaign)}{found[3]}"
+    return put(text, name, table(campaign))
 
 
 if __name__ == "__main__":
-    PAGE.write_text(BLOCK.sub(renewed, PAGE.read_text("utf-8")), "utf-8")
+    for name in CAMPAIGNS:
+        PAGE.write_text(renewed(PAGE.read_text("utf-8"), name), "utf-8")

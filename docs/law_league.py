@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import re
 import subprocess
 import sys
 import time
@@ -33,6 +32,7 @@ from space_robot.processes.executor import cores
 
 sys.path.append(str(Path(__file__).parent / "flown"))
 from flexible_joints import geared
+from marks import put
 
 HERE = Path(__file__).parent
 PAGE = HERE / "law_league.md"
@@ -249,12 +249,6 @@ def draw(found: Mapping[str, Any]) -> None:
         figure.legend(lines, names, loc="outside right center", frameon=False)
         save_figure(figure, HERE / "law_fronts")
     HERE.joinpath("law_fronts.svg").unlink()
-
-
-def put(text: str, name: str, table: str) -> str:
-    """Return a page with a table between its marks."""
-    block = re.compile(rf"(<!-- begin {name} -->\n).*?(<!-- end -->)", re.DOTALL)
-    return block.sub(lambda found: f"{found[1]}{table}\n{found[2]}", text)
 
 
 def renewed(text: str, folder: Path) -> str:

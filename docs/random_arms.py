@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import argparse
 import itertools
-import re
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -21,6 +21,9 @@ from space_robot import Scenario, fly_many
 from space_robot.analysis.words import with_statistic
 from space_robot.campaign.gain_set import tuned_set
 from space_robot.tuning.method import Tuned, TuningOptions
+
+sys.path.append(str(Path(__file__).parent / "flown"))
+from marks import markdown, put
 
 PAGE = Path(__file__).parent / "explanation" / "nominal_inertia.md"
 FIGURE = Path(__file__).with_name("random_arms.png")
@@ -110,7 +113,7 @@ def made(number: int) -> tuple[list[Scenario], dict[str, Tuned]]:
     plant, scenarios = with_wrong_masses(rng, nominal), []
     for kind in KINDS:
         law, own = ("ctc", sets["constant"]) if kind == "ctc" else ("tde_stc", sets[kind])
-        gains = {name: values.tolist() for name, values in own.gains[law].items()}
+        gains = {name: values.tolist() for name, values in own.laws[law].gains.items()}
         corner = {"controller": {"acceleration_filter_hz": own.corner_hz}}
         scenarios.append(
             Scenario(
@@ -152,7 +155,7 @@ def table(arms: list[Arm]) -> str:
     """Return how many arms have which error."""
     edges = [0.0, *LIMITS, 1e300]
     titles = [f"below {LIMITS[0]:.0e}", *(f"to {x:.0e}" for x in LIMITS[1:]), "more", "diverged"]
-    lines = [f"| error, rad | {' | '.join(titles)} | median |", "|---" * (len(titles) + 2) + "|"]
+    rows = []
     names = {"ctc": "CTC", "constant": "TDE-STC, constant", "nominal": "TDE-STC, nominal"}
     for kind in KINDS:
         errors = np.array([arm.errors[kind] for arm in arms])
@@ -161,10 +164,8 @@ def table(arms: list[Arm]) -> str:
             for low, high in itertools.pairwise(edges)
         ]
         counts.append(int(np.sum(np.isinf(errors))))
-        lines.append(
-            f"| {names[kind]} | {' | '.join(map(str, counts))} | {np.median(errors):.1e} |"
-        )
-    return re.sub(r"e-0", "e-", "\n".join(lines))
+        rows.append([names[kind], *map(str, counts), f"{np.median(errors):.1e}"])
+    return markdown(("error, rad", *titles, "median"), rows).replace("e-0", "e-")
 
 
 def draw(arms: list[Arm]) -> None:
@@ -191,11 +192,7 @@ def main() -> None:
     parser.add_argument("--arms", type=int, default=100, metavar="N", help="number of arms")
     arms = list(flown(parser.parse_args().arms))
     draw(arms)
-    text = table(arms)
-    print(text)
-    place = re.compile(r"(<!-- random arms -->\n\n).*?(\n\n<!-- end -->)", re.DOTALL)
-    page = PAGE.read_text("utf-8")
-    PAGE.write_text(place.sub(lambda match: f"{match[1]}{text}{match[2]}", page), "utf-8")
+    PAGE.write_text(put(PAGE.read_text("utf-8"), "random_arms", table(arms)), "utf-8")
 
 
 if __name__ == "__main__":

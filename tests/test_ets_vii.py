@@ -23,7 +23,7 @@ RUNS = {"ets_vii": 300, "ets_vii_wheels": 150}
 
 def rows(campaign: str) -> list[list[str]]:
     """Cells of the page's table of a campaign."""
-    block = re.search(rf"<!-- begin campaigns/{campaign} -->\n(.*?)<!-- end -->", PAGE, re.DOTALL)
+    block = re.search(rf"<!-- table {campaign} -->\n(.*?)<!-- end -->", PAGE, re.DOTALL)
     assert block is not None
     lines = [line for line in block[1].splitlines() if line.startswith("| `")]
     return [[cell.strip() for cell in line.strip("|").split("|")] for line in lines]

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import re
 from pathlib import Path
-from typing import Any
 
 import pytest
 from shown import NUMBER, ROOT, block, check, run, step
@@ -47,47 +46,6 @@ def test_a_bag_is_as_large_as_the_page_says(bags: Path) -> None:
     assert float(size) == pytest.approx(written / 1e6, rel=0.01)
 
 
-def test_the_errata_have_the_torques_and_variations_of_their_commands(tmp_path: Path) -> None:
-    """Both readings of the misprint in Table III, and the smoothness of the laws."""
-    groups = ("base_torque", "torque_1_3", "torque_4_6")
-    robot = (ROOT / "config/robots/paper.yaml").read_text("utf-8").replace("-1.08,", "-0.108,")
-    (tmp_path / "misprint.yaml").write_text(robot, "utf-8")
-    (tmp_path / "short_link.yaml").write_text(robot.replace("d: 2.16", "d: 0.216"), "utf-8")
-    gains = str(ROOT / "config/gains/paper/printed")
-
-    def simulated(*options: str) -> dict[str, Any]:
-        report: dict[str, Any] = json.loads(run("simulate", "--json", *options))
-        return report
-
-    ours, *others = (
-        simulated("--no-friction", *options)["metrics"]
-        for options in (
-            (),
-            *(
-                ("--robot", str(tmp_path / name), "--mission", "paper", "--gains", gains)
-                for name in ("misprint.yaml", "short_link.yaml")
-            ),
-        )
-    )
-    text = (ROOT / "docs/explanation/errata.md").read_text("utf-8")
-    rows = block("docs/explanation/errata.md", "| base torque |", "| joints 4-6 |")
-    for row, group in zip(rows, groups, strict=True):
-        shown = [cell.strip() for cell in row.split("|")[2:-1]]
-        flown = [f"{report[f'{group}.rms']:.4f}" for report in (ours, *others)]
-        assert [shown[0], *shown[2:]] == flown
-    (head,) = re.findall(r"^\| \| (ctc, tuned .*) \|$", text, re.MULTILINE)
-    smoothness = [
-        simulated("--controller", law, "--gains", gain_set)["metrics"]
-        for law, gain_set in (column.split(", ") for column in head.split(" | "))
-    ]
-    rows = text.split(head)[1].splitlines()[2:5]
-    for row, group in zip(rows, groups, strict=True):
-        shown = [cell.strip() for cell in row.split("|")[2:-1]]
-        assert shown == [
-            f"{metrics[f'{group}.variation']:#.3g}".rstrip(".") for metrics in smoothness
-        ]
-
-
 def test_the_page_on_missions_has_the_demands_that_plan_prints() -> None:
     """Of the paper's mission, as it is and made lighter."""
     for label, *options in (
@@ -103,10 +61,9 @@ def test_the_page_on_missions_has_the_demands_that_plan_prints() -> None:
         )
         text = (ROOT / "docs/manual/missions.md").read_text("utf-8")
         (row,) = re.findall(rf"^\| {re.escape(label)} \|(.*)\|$", text, re.MULTILINE)
-        assert [float(cell) for cell in row.split("|")] == pytest.approx(
-            [float(number) for number in flown],
-            rel=2e-2 if options else 1e-3,  # where bends stop depends on the processor's BLAS
-        )
+        for cell, number in zip(map(str.strip, row.split("|")), flown, strict=True):
+            # one in the last place: where bends stop depends on the processor's BLAS
+            assert float(cell) == pytest.approx(float(number), abs=1.01 * step(cell)), label
 
 
 def test_the_page_on_stability_has_the_numbers_of_its_command() -> None:

@@ -20,10 +20,10 @@ def main() -> None:
     arguments = parser.parse_args()
     for name in arguments.pages or known:
         page = known[name]
-        flights = list(page.flights()) if arguments.all else page.stale()
+        flights = list(page.flights()) if arguments.all else page.stale(lambda _: True)
         print(f"{page.path}: {len(flights)} of {len(page.flights())} flights")
         page.fly(flights)
-        (DOCS / page.path).write_text(page.written(), "utf-8")
+        (DOCS / page.path).write_text(page.written(page.text()), "utf-8")
 
 
 if __name__ == "__main__":

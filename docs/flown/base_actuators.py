@@ -13,7 +13,6 @@ from base_numbers import (
     first_at_limit,
     largest_attitude_error,
     largest_wheel_torque,
-    propellant,
     pulses,
 )
 from flown_tables import Number, Options, Page, Sentence, Table, Text
@@ -129,7 +128,7 @@ PAGE = Page(
         Sentence(
             "the flight takes {} g of propellant and {} pulses, and pushes the robot by {} mm.",
             (
-                Number(ROBUST_THRUSTERS, propellant, ".0f", 1e3),
+                Number(ROBUST_THRUSTERS, "sizing.thrusters.propellant", ".0f", 1e3),
                 Number(ROBUST_THRUSTERS, pulses, ".0f"),
                 Number(ROBUST_THRUSTERS, "pushed.max", ".0f", 1e3),
             ),

@@ -7,8 +7,10 @@ from collections.abc import Callable
 import numpy as np
 
 from space_robot.analysis import analyze
+from space_robot.analysis.analysed_log import AnalysedLog
 from space_robot.analysis.described import flown_robot
 from space_robot.analysis.errors import tracking_error
+from space_robot.analysis.measure import evaluate
 from space_robot.analysis.sizing import ActuatorSet
 from space_robot.analysis.words import with_statistic
 from space_robot.api.flown_flight import FlownFlight
@@ -37,9 +39,9 @@ def pulses(flown: FlownFlight) -> float:
     return float(np.count_nonzero(is_open[1:] & ~is_open[:-1]))
 
 
-def propellant(flown: FlownFlight) -> float:
-    """Return the propellant burnt, kg."""
-    return flown.metrics["sizing.thrusters.propellant"]
+def ended_at(flown: FlownFlight) -> float:
+    """Return the time of the flight's end, s."""
+    return flown.ended_at_s
 
 
 def largest_attitude_error(flown: FlownFlight) -> float:
@@ -60,7 +62,8 @@ def attitude_error_at(time: float) -> Callable[[FlownFlight], float]:
 
 def first_at_limit(flown: FlownFlight) -> float:
     """Return the time at which a wheel was first at a limit, s."""
-    return min(with_statistic(flown.metrics, "first_limit").values())
+    numbers, _ = evaluate(AnalysedLog(flown.log), groups=("wheel_saturation",))
+    return min(with_statistic(numbers, "first_limit").values())
 
 
 def largest_base_torque(flown: FlownFlight) -> float:

@@ -7,6 +7,7 @@ from typing import Any
 import yaml
 from flown_tables import DOCS, Number, Options, Page, Table, Text
 
+from space_robot.analysis import measure
 from space_robot.api.flown_flight import FlownFlight
 
 LAWS = ("ctc", "ctc_smc", "tde_smc", "tde_tsmc", "tde_stc")
@@ -45,8 +46,7 @@ def largest_error(flown: FlownFlight) -> float | None:
     """Return the largest error of a joint, rad; None if the flight diverged."""
     if flown.ending.outcome != "complete":
         return None
-    joints = (flown.metrics[f"joints_{group}.max"] for group in ("1_3", "4_6"))
-    return float(f"{max(joints):.6g}")
+    return max(measure(flown.log, ("joints_1_3.max", "joints_4_6.max")).values())
 
 
 def _flight(law: str, stiffness: float, encoder: str, **options: Any) -> Options:

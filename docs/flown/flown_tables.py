@@ -1,41 +1,49 @@
 """Tables and numbers of pages that are flown, and the files that keep what was flown.
 
 A page has its definition here in `docs/flown`: `NAME.py` with a `PAGE`. Its tables stand in the
-page between ``<!-- table NAME -->`` and ``<!-- end -->``; a `Sentence` stands anywhere in its text.
-What the flights gave is kept in `NAME.json`, so a page can be compared with it without flying.
+page between the marks of `put`; a `Sentence` stands anywhere in its text. What the flights gave is
+kept in `NAME.json`, so a page can be compared with it without flying.
 
 A kept flight is stale if its settings (all parameters, gains and files behind its options) are not
-those of today, or if its first `BEGINNING_S` are not flown with the same torques: that shows most
-changes of laws, noise, dynamics and allocation, too. What changes later in a flight is seen by
-``python docs/flown --all`` only, which is part of a release.
+those of today, or if a number of it, or of its beginning, is another when it is flown again. The
+tests fly again what `is_drawn`, and of long flights the beginning; ``python docs/flown --all``,
+which is part of a release, flies everything to its end.
 """
 
 from __future__ import annotations
 
 import json
+import math
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from functools import cache
 from importlib import import_module
 from pathlib import Path
 from typing import Any, NamedTuple
 
-import numpy as np
+from marks import markdown, put
 
 from space_robot import Scenario
+from space_robot.analysis import measure
 from space_robot.api.flown_flight import FlownFlight
-from space_robot.campaign.flown.manifest import flight_digest
+from space_robot.campaign.flown.manifest import ROOT, digest, flight_digest, source_digest
+from space_robot.flight.batch import batches, fly_group
+from space_robot.flight.plan import Flight
 
 DOCS = Path(__file__).parents[1]
-BEGINNING_S = 0.1
-SAME = 1e-3
-"""Relative to the largest of the torques: so much may switching laws make of a last bit."""
+BEGINNING_TICKS = 60_000
+"""Of a longer flight the tests fly no more."""
+SHARE = 3
+"""The tests fly one of so many flights."""
+SAME, ROUNDING = 1e-5, 1e-14
+"""Relative: less than a page shows; and absolute."""
 NUMBER = r"(-?\d+(?:\.\d+)?(?:e-?\d+)?|-)"
-Quantity = str | Callable[[FlownFlight], float]
-"""Name of a metric, path of another number in `FlownFlight.report`, or what computes it."""
+Quantity = str | Callable[[FlownFlight], float | None]
+"""Name of a metric, or what computes another number; None: the flight has no such number."""
 Options = Mapping[str, Any]
 """Of a `Scenario`."""
 Kept = dict[str, dict[str, Any]]
-"""What was flown: settings, beginning and numbers by the `key` of the options."""
+"""What was flown: settings, numbers and those of the beginning by the `key` of the options."""
 
 
 class Number(NamedTuple):
@@ -52,7 +60,8 @@ class Number(NamedTuple):
         value = kept[key(self.options)]["numbers"][quantity_name(self.quantity)]
         if value is None:
             return "-"
-        return re.sub(r"e([+-])0*(\d)", _exponent, format(self.scale * value, self.form))
+        text = re.sub(r"e([+-])0*(\d)", _exponent, format(self.scale * value, self.form))
+        return text.rstrip(".")
 
 
 class Text(NamedTuple):
@@ -88,17 +97,10 @@ class Table(NamedTuple):
         """Return the page with this table.
 
         Raises:
-            ValueError: it has no place for it.
+            ValueError: see `put`.
         """
         rows = [[c if isinstance(c, str) else c.text(kept) for c in row] for row in self.rows]
-        lines = [f"| {' | '.join(row)} |".replace("|  |", "| |") for row in (self.head, *rows)]
-        lines.insert(1, "|---" * len(self.head) + "|")
-        place = re.compile(
-            rf"(<!-- table {re.escape(self.name)} -->\n\n).*?(\n\n<!-- end -->)", re.S
-        )
-        if len(place.findall(page)) != 1:
-            raise ValueError(f"no place, or more than one, for the table {self.name!r}")
-        return place.sub(lambda found: f"{found[1]}{chr(10).join(lines)}{found[2]}", page)
+        return put(page, self.name, markdown(self.head, rows))
 
 
 class Sentence(NamedTuple):
@@ -115,16 +117,23 @@ class Sentence(NamedTuple):
         """Return the page with these numbers; breaks of lines stay where they are.
 
         Raises:
+            ValueError: see `places`.
+        """
+        for number, place in reversed([*zip(self.numbers_, self.places(page), strict=True)]):
+            page = f"{page[: place.start]}{number.text(kept)}{page[place.stop :]}"
+        return page
+
+    def places(self, page: str) -> list[slice]:
+        """Return where in the page its numbers stand.
+
+        Raises:
             ValueError: the words are not in the page, or more than once.
         """
         words = (re.escape(part).replace(r"\ ", r"\s+") for part in self.template.split("{}"))
-        found = list(re.finditer(NUMBER.join(words), page))
-        if len(found) != 1:
-            raise ValueError(f"{len(found)} times in the page: {self.template!r}")
-        for group in range(len(self.numbers_), 0, -1):
-            start, stop = found[0].span(group)
-            page = f"{page[:start]}{self.numbers_[group - 1].text(kept)}{page[stop:]}"
-        return page
+        matches = list(re.finditer(NUMBER.join(words), page))
+        if len(matches) != 1:
+            raise ValueError(f"{len(matches)} times in the page: {self.template!r}")
+        return [slice(*matches[0].span(group + 1)) for group in range(len(self.numbers_))]
 
 
 class Page(NamedTuple):
@@ -154,39 +163,56 @@ class Page(NamedTuple):
         kept: Kept = json.loads(self.file.read_text("utf-8")) if self.file.exists() else {}
         return kept
 
-    def stale(self) -> list[str]:
-        """Return the keys of flights that are not kept, or would not be flown so today."""
-        kept = self.kept()
-        return [
-            name
-            for name, (options, quantities) in self.flights().items()
-            if name not in kept
-            or not {quantity_name(q) for q in quantities} <= kept[name]["numbers"].keys()
-            or not is_same(kept[name], options)
-        ]
+    def stale(self, is_flown: Callable[[str], bool]) -> list[str]:
+        """Return the keys of flights that are not kept, or would not be flown so today.
+
+        Args:
+            is_flown: of a key: whether its numbers are compared, not only its settings.
+        """
+        flights, kept = self.flights(), self.kept()
+        stale, flown = set(), {}
+        for name, (options, quantities) in flights.items():
+            flight = Scenario(**options).check()
+            entry = kept.get(name, {"settings": "", "numbers": {}})
+            wanted = {quantity_name(quantity) for quantity in quantities}
+            if entry["settings"] != flight_digest(flight) or entry["numbers"].keys() != wanted:
+                stale.add(name)
+            elif is_flown(name):
+                flown[name] = beginning(options, flight)
+        for name, flight in fly(flown):
+            of_tests = kept[name].get("beginning", kept[name]["numbers"])
+            if not is_same(of_tests, numbers_of(flight, flights[name][1])):
+                stale.add(name)
+        return sorted(stale)
 
     def fly(self, names: Iterable[str]) -> None:
         """Fly some flights again, and keep what they give; forget those that the page has not."""
         flights, kept = self.flights(), self.kept()
         kept = {name: kept[name] for name in flights if name in kept}
-        for name in names:
-            options, quantities = flights[name]
-            numbers = fly(options, quantities)
-            beginning = [float(f"{value:.6g}") for value in torques(options)]
-            kept[name] = {"settings": settings(options), "beginning": beginning, "numbers": numbers}
-            ordered = {key: kept[key] for key in sorted(kept)}
-            self.file.write_text(json.dumps(ordered, indent=1) + "\n", "utf-8")
+        checked = {name: Scenario(**flights[name][0]).check() for name in names}
+        for name, flight in checked.items():
+            kept[name] = {"settings": flight_digest(flight)}
+        long = {name: flight for name, flight in checked.items() if flight.ticks > BEGINNING_TICKS}
+        begun = {name: beginning(flights[name][0], flight) for name, flight in long.items()}
+        for part, flown in (("numbers", checked), ("beginning", begun)):
+            for name, flight in fly(flown):
+                kept[name][part] = numbers_of(flight, flights[name][1])
+        self.file.write_text(json.dumps(kept, indent=1, sort_keys=True) + "\n", "utf-8")
 
-    def written(self) -> str:
+    def text(self) -> str:
+        """Read the page."""
+        return (DOCS / self.path).read_text("utf-8")
+
+    def written(self, text: str) -> str:
         """Return the page's text with what was flown.
 
         Raises:
             ValueError: a table or sentence has no place in it.
         """
-        page, kept = (DOCS / self.path).read_text("utf-8"), self.kept()
+        kept = self.kept()
         for part in self.parts:
-            page = part.put_into(page, kept)
-        return page
+            text = part.put_into(text, kept)
+        return text
 
 
 def pages() -> dict[str, Page]:
@@ -206,43 +232,54 @@ def quantity_name(quantity: Quantity) -> str:
     return quantity if isinstance(quantity, str) else quantity.__name__
 
 
-def fly(options: Options, quantities: Iterable[Quantity]) -> dict[str, float | None]:
-    """Fly to the end and return the numbers that are kept, by `quantity_name`."""
-    flown = Scenario(**options).fly()
-    return {quantity_name(quantity): _value(flown, quantity) for quantity in quantities}
+def is_drawn(name: str) -> bool:
+    """Tell whether the tests fly a flight again: others for each state of the packages' code."""
+    return int(digest(f"{_sources()}{name}".encode()), 16) % SHARE == 0
 
 
-def settings(options: Options) -> str:
-    """Return a digest of a flight's description, the numbers of its files included."""
-    return flight_digest(Scenario(**options).check())
+def beginning(options: Options, flight: Flight) -> Flight:
+    """Return what of a flight the tests fly: all of it, or its first `BEGINNING_TICKS`."""
+    if flight.ticks <= BEGINNING_TICKS:
+        return flight
+    return Scenario(**{**options, "duration": BEGINNING_TICKS * flight.period}).check()
 
 
-def torques(options: Options) -> list[float]:
-    """Return the RMS of the torque on every axis in the first `BEGINNING_S`, N m."""
-    flown = Scenario(**{**options, "duration": BEGINNING_S}).fly()
-    rms: list[float] = np.sqrt(np.mean(flown.log.applied_torque**2, axis=0)).tolist()
-    return rms
+def fly(flights: Mapping[str, Flight]) -> Iterator[tuple[str, FlownFlight]]:
+    """Fly checked flights, short ones in lanes; yield each with its name."""
+    names = list(flights)
+    short = ((n, own) for n, own in enumerate(flights.values()) if own.ticks <= BEGINNING_TICKS)
+    long = ([(n, own)] for n, own in enumerate(flights.values()) if own.ticks > BEGINNING_TICKS)
+    for group in (*batches(short), *long):  # a long flight alone has its log in a file
+        together = [flight for _, flight in group]
+        for (number, flight), one in zip(group, fly_group(together), strict=True):
+            yield names[number], FlownFlight(flight, one.ending, None, one.log)
 
 
-def is_same(kept: Mapping[str, Any], options: Options) -> bool:
-    """Tell whether a flight is still set and flown as it was when it was kept."""
-    if kept["settings"] != settings(options):
-        return False
-    before, now = np.array(kept["beginning"]), np.array(torques(options))
-    return bool(before.shape == now.shape and np.all(abs(now - before) <= SAME * before.max()))
+def numbers_of(flown: FlownFlight, quantities: Iterable[Quantity]) -> dict[str, float | None]:
+    """Return the numbers of a flight that are kept, by `quantity_name`."""
+    names = [quantity for quantity in quantities if isinstance(quantity, str)]
+    numbers: dict[str, float | None] = {**measure(flown.log.longest_stretch(), names)}
+    for quantity in quantities:
+        name = quantity_name(quantity)
+        value = numbers.get(name) if isinstance(quantity, str) else quantity(flown)
+        numbers[name] = None if value is None else float(f"{value:.6g}")
+    return numbers
 
 
-def _value(flown: FlownFlight, quantity: Quantity) -> float | None:
-    if not isinstance(quantity, str):
-        return quantity(flown)
-    if (metric := flown.metrics.get(quantity)) is not None:
-        return float(f"{metric:.6g}")
-    value: Any = flown.report()
-    *parts, last = quantity.split(".")
-    for part in parts:
-        value = (value or {}).get(part)
-    value = None if value is None else value.get(last)  # no attitude of a base that is free
-    return None if value is None else float(f"{value:.6g}")
+def is_same(kept: Mapping[str, float | None], now: Mapping[str, float | None]) -> bool:
+    """Tell whether a flight gave the same numbers."""
+    return kept.keys() == now.keys() and all(map(_is_close, kept.values(), map(now.get, kept)))
+
+
+def _is_close(first: float | None, second: float | None) -> bool:
+    if first is None or second is None:
+        return first is second
+    return math.isclose(first, second, rel_tol=SAME, abs_tol=ROUNDING)
+
+
+@cache
+def _sources() -> str:
+    return source_digest(ROOT)
 
 
 def _exponent(found: re.Match[str]) -> str:

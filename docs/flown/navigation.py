@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from base_numbers import ATTITUDE, LAWS
+from base_numbers import ATTITUDE, LAWS, ended_at
 from flown_tables import Number, Options, Page, Table, Text
 
 GRADES = ("fine", "coarse")
@@ -20,7 +20,7 @@ def _cell(options: Options) -> Text:
 def _direct(sensors: str, law: str) -> Text | Number:
     options: Options = {"sensors": sensors, "controller": law}
     if (sensors, law) in DIVERGE:
-        return Text("diverges at {} s", (Number(options, "ended_at_s", ".1f"),))
+        return Text("diverges at {} s", (Number(options, ended_at, ".1f"),))
     if (sensors, law) == ("coarse", "ctc"):  # its ripple is of no use: the attitude is lost
         return Number(options, ATTITUDE, ".1e")
     return _cell(options)

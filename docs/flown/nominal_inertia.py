@@ -6,6 +6,8 @@ from typing import Any
 
 from flown_tables import Number, Options, Page, Table
 
+from space_robot.analysis.analysed_log import AnalysedLog
+from space_robot.analysis.measure import evaluate, measure
 from space_robot.analysis.words import with_statistic
 from space_robot.api.flown_flight import FlownFlight
 
@@ -17,15 +19,16 @@ PRINTED: dict[str, Any] = {"controller": "tde_stc", "gains": "printed"}
 SCALES = (0.8, 1.005, 1.01, 1.2)
 GRADES = ("fine", "tactical", "coarse")
 CORNER_HZ = 20.0
+RIPPLE = "base_torque.ripple"
 
 
 def largest_rms(flown: FlownFlight) -> float | None:
     """Return the largest RMS error of attitude and joints; None if the flight diverged."""
     if flown.ending.outcome != "complete":
         return None
-    errors = with_statistic(flown.metrics, "rms")
-    own = [errors[key] for key in errors if key == "attitude" or key.startswith("joints")]
-    return float(f"{max(own):.6g}")
+    numbers, _ = evaluate(AnalysedLog(flown.log), groups=("errors",))
+    errors = with_statistic(numbers, "rms")
+    return max(errors[key] for key in errors if key == "attitude" or key.startswith("joints"))
 
 
 def _of_robot(robot: str) -> list[str | Number]:
@@ -63,7 +66,7 @@ def base_ripple(flown: FlownFlight) -> float | None:
     """Return the ripple of the torque on the base, N m; None if the flight diverged."""
     if flown.ending.outcome != "complete":
         return None
-    return float(f"{flown.metrics['base_torque.ripple']:.6g}")
+    return measure(flown.log, [RIPPLE])[RIPPLE]
 
 
 PAGE = Page(
