@@ -133,25 +133,36 @@ class FlownFlight:
     @property
     def plots(self) -> list[str]:
         """Names of the figures that `plot` draws."""
-        return list(self._figures.drawings())
+        return list(self._figures(None).drawings())
 
-    def plot(self, name: str = "control_results", path: str | Path | None = None) -> Figure:
+    def plot(
+        self,
+        name: str = "control_results",
+        path: str | Path | None = None,
+        *,
+        width: str | float | None = None,
+        formats: Sequence[str] = ("png", "svg"),
+    ) -> Figure:
         """Draw a figure of ``space-robot analyze --plot``.
 
         Args:
             name: one of `plots`.
-            path: of the PNG and SVG files, without suffix; None: no file, for notebooks.
+            path: of the files, without suffix; None: no file, for notebooks.
+            width: for a paper: "single", "double" or mm, without a title; None: 180 mm.
+            formats: of the files: png, svg, pdf.
 
         Raises:
-            InputError: there is no such figure, or it cannot be written.
+            InputError: there is no such figure, width or format, or it cannot be written.
         """
-        drawings = self._figures.drawings()
+        from ..analysis.figures.style import parse_width  # slow to import
+
+        drawings = self._figures(None if width is None else parse_width(width)).drawings()
         file = None if path is None else as_path(path, "path")
         figure = drawings[one_of(name, drawings, "figure")].draw()
         if file is not None:
             from ..analysis.figures.style import save_figure  # slow to import
 
-            save_figure(figure, file)
+            save_figure(figure, file, formats)
         return figure
 
     def save(self, bag: str | Path) -> Path:
@@ -233,13 +244,17 @@ class FlownFlight:
         rows = [row for group in table.groups for row in table.texts(group)]
         return html_table([column.heading for column in table.columns], rows, caption)
 
-    @cached_property
-    def _figures(self) -> FigureSet:
+    def _figures(self, width: float | None) -> FigureSet:
         from ..analysis.figures.figure_set import FigureSet  # slow to import
 
-        figures = FigureSet()
-        figures.add("flight", self.log.longest_stretch())
-        return figures
+        if width not in self._figure_sets:
+            self._figure_sets[width] = FigureSet(width=width)
+            self._figure_sets[width].add("flight", self.log.longest_stretch())
+        return self._figure_sets[width]
+
+    @cached_property
+    def _figure_sets(self) -> dict[float | None, FigureSet]:
+        return {}
 
 
 FLOWN = (
