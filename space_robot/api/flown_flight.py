@@ -133,7 +133,7 @@ class FlownFlight:
     @property
     def plots(self) -> list[str]:
         """Names of the figures that `plot` draws."""
-        return list(self._figures(None).drawings())
+        return list(self._figures.drawings())
 
     def plot(
         self,
@@ -154,14 +154,13 @@ class FlownFlight:
         Raises:
             InputError: there is no such figure, width or format, or it cannot be written.
         """
-        from ..analysis.figures.style import parse_width  # slow to import
+        from ..analysis.figures.style import parse_width, save_figure  # slow to import
 
-        drawings = self._figures(None if width is None else parse_width(width)).drawings()
+        figures = self._figures if width is None else self._figures_of(parse_width(width))
+        drawings = figures.drawings()
         file = None if path is None else as_path(path, "path")
         figure = drawings[one_of(name, drawings, "figure")].draw()
         if file is not None:
-            from ..analysis.figures.style import save_figure  # slow to import
-
             save_figure(figure, file, formats)
         return figure
 
@@ -244,17 +243,16 @@ class FlownFlight:
         rows = [row for group in table.groups for row in table.texts(group)]
         return html_table([column.heading for column in table.columns], rows, caption)
 
-    def _figures(self, width: float | None) -> FigureSet:
+    @cached_property
+    def _figures(self) -> FigureSet:
+        return self._figures_of(None)
+
+    def _figures_of(self, width: float | None) -> FigureSet:
         from ..analysis.figures.figure_set import FigureSet  # slow to import
 
-        if width not in self._figure_sets:
-            self._figure_sets[width] = FigureSet(width=width)
-            self._figure_sets[width].add("flight", self.log.longest_stretch())
-        return self._figure_sets[width]
-
-    @cached_property
-    def _figure_sets(self) -> dict[float | None, FigureSet]:
-        return {}
+        figures = FigureSet(width=width)
+        figures.add("flight", self.log.longest_stretch())
+        return figures
 
 
 FLOWN = (

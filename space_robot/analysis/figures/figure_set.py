@@ -116,8 +116,12 @@ class FigureSet:
 
     def drawings(self) -> dict[str, Drawing]:
         """Return the available figures by file name, without drawing them."""
-        curves, width, drawings = self._curves, self._width, dict[str, Drawing]()
+        curves, drawings = self._curves, dict[str, Drawing]()
         torques = {n: c.base_torque for n, c in curves.items() if c.base_torque is not None}
+
+        def add(stem: str, caption: str, draw: Callable[..., Figure], flights: object) -> None:
+            drawings[stem] = Drawing(caption, partial(draw, flights, width=self._width))
+
         for number, (name, figure) in enumerate(self._missions.values(), start=1):
             suffix, whose = (f"_{number}", f" of {name}") if len(self._missions) > 1 else ("", "")
             caption = f"Desired joint angles{whose} (Fig. 5)"
@@ -127,21 +131,11 @@ class FigureSet:
             drawings["control_results"] = Drawing.of(caption, self._first)
         else:
             caption = "Errors and torques, norms over each group of axes (Figs. 6 to 9)"
-            drawings["control_results"] = Drawing(
-                caption, partial(errors_and_torques, curves, width)
-            )
+            add("control_results", caption, errors_and_torques, curves)
         if torques:
-            drawings |= {
-                "junctions": Drawing(
-                    "Base torque x where two motions meet", partial(junctions, torques, width)
-                ),
-                "chatter": Drawing(
-                    "A stretch of base torque, and its spectrum", partial(chatter, torques, width)
-                ),
-            }
-        drawings["ripple"] = Drawing(
-            "Spectrum of the torques' ripple", partial(ripple, curves, width)
-        )
+            add("junctions", "Base torque x where two motions meet", junctions, torques)
+            add("chatter", "A stretch of base torque, and its spectrum", chatter, torques)
+        add("ripple", "Spectrum of the torques' ripple", ripple, curves)
         for number, (name, own) in enumerate(self._own.items(), start=1):
             suffix, whose = (f"_{number}", f" of {name}") if len(curves) > 1 else ("", "")
             for stem, drawing in own.items():
@@ -149,11 +143,10 @@ class FigureSet:
                 drawings[f"{stem}{suffix}"] = drawing._replace(caption=caption)
         if torques:
             caption = "The base's pointing error; limit: the band"
-            drawings["base_pointing"] = Drawing(caption, partial(base_pointing, curves, width))
+            add("base_pointing", caption, base_pointing, curves)
         caption = "The end effector's pointing error in the inertial frame"
-        drawings["pointing"] = Drawing(caption, partial(pointing, curves, width))
-        caption = "Time from a state's sending to its command's"
-        drawings["latency"] = Drawing(caption, partial(latency_histogram, curves, width))
+        add("pointing", caption, pointing, curves)
+        add("latency", "Time from a state's sending to its command's", latency_histogram, curves)
         return drawings
 
 

@@ -25,6 +25,7 @@ from .style import (
     NARROW,
     PAGE_WIDTH,
     LineStyle,
+    binned,
     house_style,
     legend_above,
     legend_inside,
@@ -182,11 +183,8 @@ def _looks(log: FlightLog, labels: Sequence[str]) -> list[int]:
 
 
 def _draw_pulses(axes: Axes, time: Array, is_open: Array, period: float) -> None:
-    length = max(1, -(-len(time) // BINS))
-    starts = np.arange(0, len(time), length)
-    counts = np.diff(np.append(starts, len(time)))
-    share = np.add.reduceat(np.nan_to_num(is_open), starts, axis=0) / counts[:, np.newaxis]
-    count = is_open.shape[1]
+    length, count = max(1, -(-len(time) // BINS)), is_open.shape[1]
+    share = binned(time, np.nan_to_num(is_open), length)[2]
     axes.imshow(
         share.T,
         cmap="Greys",
@@ -194,7 +192,7 @@ def _draw_pulses(axes: Axes, time: Array, is_open: Array, period: float) -> None
         vmax=1.0,
         aspect="auto",
         interpolation="nearest",
-        extent=(time[0] - period, time[0] + (starts[-1] + length - 1) * period, count + 0.5, 0.5),
+        extent=(time[0] - period, time[0] + (len(share) * length - 1) * period, count + 0.5, 0.5),
     )
     axes.grid(visible=False)
     axes.yaxis.set_major_locator(MaxNLocator(integer=True))

@@ -15,6 +15,7 @@ import re
 import textwrap
 import warnings
 from collections.abc import Collection, Mapping, Sequence
+from contextlib import suppress
 from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -44,8 +45,6 @@ PAGE_WIDTH = 180.0
 """Width of a page, mm: A4 without margins."""
 WIDTHS = {"single": 88.9, "double": 181.9}
 """Widths of one and of two columns of IEEE's journals, mm."""
-NARROWEST, WIDEST = 60.0, 500.0
-"""Limits of the width of a figure, mm."""
 NARROW = 120.0
 """Width, mm, below which panels stand below one another."""
 NO_DATES = {
@@ -89,16 +88,12 @@ def parse_width(width: str | float) -> float:
     Raises:
         InputError: it is neither, or out of range.
     """
-    try:
-        number = WIDTHS[width] if isinstance(width, str) and width in WIDTHS else float(width)
-    except (TypeError, ValueError):
-        number = math.nan
-    if not NARROWEST <= number <= WIDEST:
-        names = ", ".join(WIDTHS)
-        raise InputError(
-            f"width {short(width)}: {names}, or {NARROWEST:g} to {WIDEST:g} mm expected"
-        )
-    return number
+    mm = math.nan
+    with suppress(TypeError, ValueError):
+        mm = float(WIDTHS.get(str(width), width))
+    if not 60.0 <= mm <= 500.0:
+        raise InputError(f"width {short(width)}: {', '.join(WIDTHS)}, or 60 to 500 mm expected")
+    return mm
 
 
 def page(height: float, title: str = "", width: float = PAGE_WIDTH) -> Figure:
@@ -142,7 +137,9 @@ def plot_lines(
     length = -(-len(x) // max(1, int(axes.get_window_extent().width)))
     is_long = length > 2
     if is_long:
+        (first, last), ends = x[[0, -1]], values[[0, -1]]
         x, low, values, high = binned(x, values, length)
+        x[0], x[-1], values[[0, -1]] = first, last, ends
         marks = None if marks is None else np.minimum(marks // length, len(x) - 1)
     for depth, column in enumerate(np.argsort(-wildness, kind="stable").tolist()):
         look, zorder = LineStyle.of(looks[column]), 2.0 + 0.01 * depth
@@ -165,8 +162,7 @@ def plot_lines(
 def binned(x: Array, values: Array, length: int) -> tuple[Array, Array, Array, Array]:
     """Return places, minima, means and maxima of each ``length`` samples, and of those left over.
 
-    First and last place and mean are those of the first and the last sample. Values that are not
-    finite are left out; NaN: there is no other.
+    Values that are not finite are left out; NaN: there is no other.
     """
     starts = np.arange(0, len(x), length)
     values = _finite(values)
@@ -175,10 +171,7 @@ def binned(x: Array, values: Array, length: int) -> tuple[Array, Array, Array, A
     with np.errstate(over="ignore", invalid="ignore"):
         means = np.add.reduceat(np.nan_to_num(values), starts, axis=0) / counts
     low, high = (f.reduceat(values, starts, axis=0) for f in (np.fmin, np.fmax))
-    places = x[np.minimum(starts + length // 2, len(x) - 1)]
-    for end in (0, -1):
-        places[end], means[end] = x[end], values[end]
-    return places, low, means, high
+    return x[np.minimum(starts + length // 2, len(x) - 1)], low, means, high
 
 
 def _finite(values: Array) -> Array:
