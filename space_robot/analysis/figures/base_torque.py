@@ -20,7 +20,7 @@ from ..torques import CHATTER_FREQUENCY
 from .single_flight import BASE_AXES, JUNCTION_HALF_WIDTH
 from .style import (
     GREY,
-    NARROW,
+    NARROW_PAGE,
     PAGE_WIDTH,
     grid,
     house_style,
@@ -89,7 +89,7 @@ def junctions(flights: Mapping[str, BaseTorque], width: float = PAGE_WIDTH) -> F
     ]
     if not moments:
         return page(12.0, "None of these flights passes a junction of two segments.")
-    columns = 1 if width < NARROW else min(2, len(flights))
+    columns = 1 if width < NARROW_PAGE else min(2, len(flights))
     figure = page(12.0 + 45.0 * math.ceil(len(flights) / columns), width=width)
     interval = -JUNCTION_HALF_WIDTH, JUNCTION_HALF_WIDTH
     panels = _draw_side_by_side(figure, columns, flights, min(moments), interval, 1)
@@ -109,7 +109,7 @@ def chatter(flights: Mapping[str, BaseTorque], width: float = PAGE_WIDTH) -> Fig
     """
     start = min(flight.start for flight in flights.values())
     moment = start + (max(flight.end for flight in flights.values()) - start) / 4.0
-    rows = math.ceil(len(flights) / (2 if width < NARROW else 4))
+    rows = math.ceil(len(flights) / (2 if width < NARROW_PAGE else 4))
     columns = math.ceil(len(flights) / rows)
     height, spectrum_height = 20.0 + 38.0 * math.ceil(len(flights) / columns), 90.0
     figure = page(height + spectrum_height, width=width)

@@ -23,7 +23,7 @@ from ..plotted import PlottedQuantity, flown_quantities
 from ..torques import RippleSpectrum, ripple_spectrum
 from .base_torque import BaseTorque
 from .style import (
-    NARROW,
+    NARROW_PAGE,
     PAGE_WIDTH,
     LineStyle,
     house_style,
@@ -106,7 +106,7 @@ def errors_and_torques(flights: Mapping[str, FlightCurves], width: float = PAGE_
     """Draw Figs. 6 to 9 of several flights: sizes of errors (left, logarithmic) and torques."""
     errors = [panel for panel in _panels(flights, "attitude", "joints") if panel.is_error]
     torques = _panels(flights, "torques")
-    columns = [errors + torques] if width < NARROW else [errors, torques]
+    columns = [errors + torques] if width < NARROW_PAGE else [errors, torques]
     return _draw(columns, flights, width)
 
 

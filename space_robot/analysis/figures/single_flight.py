@@ -22,7 +22,7 @@ from ..mission_plan import PlannedSegment
 from ..plotted import AXES as XYZ
 from ..plotted import PlottedQuantity, flown_quantities
 from .style import (
-    NARROW,
+    NARROW_PAGE,
     PAGE_WIDTH,
     LineStyle,
     binned,
@@ -89,7 +89,7 @@ def control_results(log: FlightLog, title: str, width: float = PAGE_WIDTH) -> Fi
     error, torque, time = tracking_error(log)[:, 3:], log.applied_torque, log.time
     moments = time[junction_ticks(log)[:MOST_JUNCTIONS]]
     rows = 3 if len(moments) else 2
-    is_narrow = width < NARROW
+    is_narrow = width < NARROW_PAGE
     figure = page(22.0 + (68.0 if is_narrow else 46.0) * rows, title, width)
     heights = 2 * [1.0, 1.0, 1.4][:rows] if is_narrow else None
     cells = figure.add_gridspec(*(2 * rows, 1) if is_narrow else (rows, 2), height_ratios=heights)

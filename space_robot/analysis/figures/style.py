@@ -45,7 +45,7 @@ PAGE_WIDTH = 180.0
 """Width of a page, mm: A4 without margins."""
 WIDTHS = {"single": 88.9, "double": 181.9}
 """Widths of one and of two columns of IEEE's journals, mm."""
-NARROW = 120.0
+NARROW_PAGE = 120.0
 """Width, mm, below which panels stand below one another."""
 NO_DATES = {
     "png": {"Software": None},
@@ -53,7 +53,7 @@ NO_DATES = {
     "pdf": {"CreationDate": None, "Creator": None, "Producer": None},
 }
 """Formats of files, with metadata that are the same at any time."""
-NEAR = 2.0
+NEAR_LIMIT = 2.0
 """Multiple of the largest value up to which a limit is drawn, instead of written."""
 GREY = "#707070"
 COLOURS = ("#000000", "#E69F00", "#0072B2", "#CC79A7", "#009E73", "#56B4E9", "#D55E00")
@@ -137,9 +137,9 @@ def plot_lines(
     length = -(-len(x) // max(1, int(axes.get_window_extent().width)))
     is_long = length > 2
     if is_long:
-        (first, last), ends = x[[0, -1]], values[[0, -1]]
+        ends = x[[0, -1]]
         x, low, values, high = binned(x, values, length)
-        x[0], x[-1], values[[0, -1]] = first, last, ends
+        x[[0, -1]] = ends
         marks = None if marks is None else np.minimum(marks // length, len(x) - 1)
     for depth, column in enumerate(np.argsort(-wildness, kind="stable").tolist()):
         look, zorder = LineStyle.of(looks[column]), 2.0 + 0.01 * depth
@@ -218,7 +218,7 @@ def mark_events(axes: Axes, times: Array) -> None:
 def mark_limits(axes: Axes, limits: Sequence[float], values: Array) -> None:
     """Draw limits of either sign as lines; those far beyond the values are written above."""
     largest, is_log = np.nanmax(np.abs(values), initial=0.0), axes.get_yscale() == "log"
-    near = sorted({limit for limit in limits if 0.0 < limit <= NEAR * largest})
+    near = sorted({limit for limit in limits if 0.0 < limit <= NEAR_LIMIT * largest})
     for limit in near:
         for side in (limit,) if is_log else (-limit, limit):
             axes.axhline(side, color=GREY, linewidth=0.8, linestyle=":", zorder=1.5)
