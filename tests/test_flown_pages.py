@@ -63,7 +63,7 @@ def test_a_last_digit_that_is_changed_is_noticed(name: str) -> None:
 
 
 OTHERS = {
-    "tests/test_docs.py": "compare explanation/errata fronts robots",
+    "tests/test_docs.py": "compare drifts explanation/errata fronts made robots rows",
     "tests/laboratory/campaign/test_verdicts.py": "explanation/campaign_statistics rules",
     "tests/test_ets_vii.py": "explanation/ets_vii ets_vii ets_vii_wheels",
     "settings": (
@@ -73,7 +73,6 @@ OTHERS = {
     "words of code": "explanation/kernels",
     "times of a machine": "explanation/lanes measurements/performance",
     "times of a machine, and flights as slow": "explanation/model_predictive_control",
-    "robots that are not shipped": "explanation/nominal_inertia",
     "campaigns of many flights": "explanation/real_spacecraft",
     "tests/model/elementary/test_functions.py": "explanation/same_bits",
     "tests/test_shown_outputs.py": "explanation/stability manual/missions",

@@ -9,9 +9,8 @@ from __future__ import annotations
 import argparse
 import json
 import platform
-import re
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from datetime import date
 from importlib.metadata import version
 from pathlib import Path
@@ -20,24 +19,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from space_robot.console.tables import Table, as_markdown, named
+DOCS = Path(__file__).parents[1]
+sys.path += [str(DOCS / "flown"), str(DOCS / "pictures")]
+from marks import markdown, put  # noqa: E402
 
 Array = NDArray[np.float64]
-DOCS = Path(__file__).parents[1]
 PAGE, NUMBERS, PICTURE = (DOCS / f"validation.{kind}" for kind in ("md", "json", "svg"))
 PACKAGES = "space_robot", "numpy", "numba"
 KEPT = "linear momentum", "angular momentum", "energy"
 OURS = "space_robot, RK4"
-INK, FAINT, LINES = "#010101", "#020202", ("#030303", "#040404", "#050505", "#060606")
-"""Colours that matplotlib draws with; `themed` replaces them."""
-THEME = {  # in light and in dark
-    INK: ("#1f2328", "#e6edf3"),
-    FAINT: ("#d1d9e0", "#3d444d"),
-    LINES[0]: ("#0072b2", "#56b4e9"),
-    LINES[1]: ("#b35900", "#e69f00"),
-    LINES[2]: ("#007a5a", "#2fc99b"),
-    LINES[3]: ("#b0418a", "#e08cc0"),
-}
 
 
 def measure() -> tuple[list[dict[str, Any]], dict[str, Array]]:
@@ -87,27 +77,20 @@ def written(page: str, numbers: dict[str, Any]) -> str:
     head = "compared", "with", "over", "largest difference", "limit"
     made = ", ".join(f"{name} {text}" for name, text in numbers["versions"].items())
     parts = {
-        "rows": table(head, [cells(row) for row in numbers["rows"]]),
-        "drifts": table(
+        "rows": markdown(head, [cells(row) for row in numbers["rows"]]),
+        "drifts": markdown(
             ("integrator", *KEPT),
             [[name, *map(short, drift)] for name, drift in numbers["drifts"].items()],
         ),
         "made": f"Made on {numbers['date']} with {made}.",
     }
     for name, part in parts.items():
-        place = re.compile(rf"(<!-- begin {name} -->\n\n).*?(\n\n<!-- end -->)", re.S)
-        page = place.sub(lambda match, part=part: f"{match[1]}{part}{match[2]}", page)
+        page = put(page, name, part)
     return page
-
-
-def table(head: Sequence[str], rows: Sequence[list[str]]) -> str:
-    """Return a table in Markdown."""
-    return as_markdown("", [Table.of("", [*map(named, head)], rows)]).strip("# \n")
 
 
 def draw(drifts: dict[str, Array]) -> None:
     """Draw the drift of angular momentum over time."""
-    sys.path.append(str(DOCS / "pictures"))
     import theme
 
     figure, (axes,) = theme.panels()

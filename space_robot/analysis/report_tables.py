@@ -10,14 +10,16 @@ import numpy as np
 
 from space_robot_msgs_py.topics import BASE_AXES
 
-from ..console.tables import NONE, Column, Group, JudgedCell, Row, Table
+from ..console.tables import NONE, Column, Group, JudgedCell, Row, Table, as_latex, named
 from .described import IDEAL
-from .measure import column_definition, describe, metric_group
+from .measure import column_definition, column_label, describe, metric_group
 from .series import GROUPS
 from .words import Report, analyzed, flown, law_text, notes, remarks, seen_through, with_statistic
 
 IN_RMS_TABLE = ("rms", "rms_eq64", "variation", "chatter", "ripple")
 """Statistics of the table of RMS."""
+MAIN = {"rms": "RMS, mean of axes", "max": "maximum", "ripple": "ripple, RMS"}
+"""Statistics of the table in LaTeX."""
 WIDE = 1e4
 """Torque from which on all torques of a table are written with exponents: of diverged flights."""
 OWN_METRICS = "own metrics"
@@ -95,6 +97,39 @@ def comparison_table(reports: Mapping[str, Report]) -> Table:
     groups = _groups(each, shown_names(each))
     return Table(
         "", columns, [Group(flights, "flight"), *groups, *_demand_on_axes(each), *_recording(each)]
+    )
+
+
+def latex_table(reports: Mapping[str, Report], descriptions: Mapping[str, Any]) -> str:
+    """Return the main results of flights as LaTeX: errors and torques, a column for each bag.
+
+    ``descriptions``: what was flown, by name of the bag, for the caption.
+    """
+    each = [report["metrics"] for report in reports.values()]
+    names = dict.fromkeys(name for metrics in each for name in table_v_columns(metrics))
+    groups = []
+    for statistic, title in MAIN.items():
+        rows = [
+            [column_label(name), column_definition(name).unit.replace(" ", "\u00a0"), *values]
+            for name in names
+            if any(values := [metrics.get(f"{name}.{statistic}") for metrics in each])
+        ]
+        groups += [Group(rows, title)] if rows else []
+    conditions = [
+        f"{name}: {flown(report)}{_friction(descriptions[name])}, sensors {report['sensors']}, "
+        f"{report['from_s']:g} to {report['to_s']:g} s"
+        for name, report in reports.items()
+    ]
+    columns = named(), named("unit"), *(Column(name, spec="#.3g") for name in reports)
+    return as_latex(Table(f"Errors and torques. {'; '.join(conditions)}.", columns, groups))
+
+
+def _friction(description: Mapping[str, Any]) -> str:
+    if not description.get("friction", True):
+        return ", without friction"
+    case = description.get("scenario", {}).get("case")
+    return (
+        ", friction" if isinstance(case, Mapping) and any(case.get("friction", {}).values()) else ""
     )
 
 

@@ -135,23 +135,33 @@ class FlownFlight:
         """Names of the figures that `plot` draws."""
         return list(self._figures.drawings())
 
-    def plot(self, name: str = "control_results", path: str | Path | None = None) -> Figure:
+    def plot(
+        self,
+        name: str = "control_results",
+        path: str | Path | None = None,
+        *,
+        width: str | float | None = None,
+        formats: Sequence[str] = ("png", "svg"),
+    ) -> Figure:
         """Draw a figure of ``space-robot analyze --plot``.
 
         Args:
             name: one of `plots`.
-            path: of the PNG and SVG files, without suffix; None: no file, for notebooks.
+            path: of the files, without suffix; None: no file, for notebooks.
+            width: for a paper: "single", "double" or mm, without a title; None: 180 mm.
+            formats: of the files: png, svg, pdf.
 
         Raises:
-            InputError: there is no such figure, or it cannot be written.
+            InputError: there is no such figure, width or format, or it cannot be written.
         """
-        drawings = self._figures.drawings()
+        from ..analysis.figures.style import parse_width, save_figure  # slow to import
+
+        figures = self._figures if width is None else self._figures_of(parse_width(width))
+        drawings = figures.drawings()
         file = None if path is None else as_path(path, "path")
         figure = drawings[one_of(name, drawings, "figure")].draw()
         if file is not None:
-            from ..analysis.figures.style import save_figure  # slow to import
-
-            save_figure(figure, file)
+            save_figure(figure, file, formats)
         return figure
 
     def save(self, bag: str | Path) -> Path:
@@ -235,9 +245,12 @@ class FlownFlight:
 
     @cached_property
     def _figures(self) -> FigureSet:
+        return self._figures_of(None)
+
+    def _figures_of(self, width: float | None) -> FigureSet:
         from ..analysis.figures.figure_set import FigureSet  # slow to import
 
-        figures = FigureSet()
+        figures = FigureSet(width=width)
         figures.add("flight", self.log.longest_stretch())
         return figures
 

@@ -160,8 +160,8 @@ def write_report(choice: Recommendation, folder: Path, command: str) -> Path:
     """
     make_folder(folder)
     with house_style():
-        files = save_figure(fronts_figure(choice.fronts, choice.law), folder / "fronts", png=True)
-    figure = SavedFigure("Error against ripple: the fronts of the laws", files[-1])
+        files = save_figure(fronts_figure(choice.fronts, choice.law), folder / "fronts")
+    figure = SavedFigure("Error against ripple: the fronts of the laws", files)
     text = template("space_robot.choice", "choice.html.j2").render(
         robot=str(choice.scenario.get("robot", "paper")),
         sentence=choice.sentence,

@@ -23,7 +23,20 @@ if TYPE_CHECKING:
 
 @click.command()
 @click.argument("bags", nargs=-1, required=True, type=click.Path(path_type=Path), metavar="BAG...")
-@folder_option("--plot", help="Folder for the figures, as PNG and SVG; several bags overlaid.")
+@folder_option("--plot", help="Folder for the figures; several bags overlaid.")
+@click.option(
+    "--format",
+    "formats",
+    multiple=True,
+    type=click.Choice(["png", "svg", "pdf"]),
+    help="Of the figures; may be repeated [default: png, svg].",
+)
+@click.option(
+    "--width",
+    metavar="single|double|MM",
+    help="Of the figures, for a paper: one column (88.9 mm), two (181.9 mm), or mm "
+    "[default: 180, with titles].",
+)
 @click.option(
     "--csv",
     type=click.Path(path_type=Path),
@@ -37,6 +50,7 @@ if TYPE_CHECKING:
     help="The same as Parquet, with the flight's description.",
 )
 @file_option("--html", help="One page with tables and figures, to send to a colleague.")
+@file_option("--latex", help="The main results as a LaTeX table, for a paper.")
 @click.option(
     "--metric",
     "metrics",
@@ -71,9 +85,12 @@ if TYPE_CHECKING:
 def analyze(
     bags: tuple[Path, ...],
     plot: Path | None,
+    formats: tuple[str, ...],
+    width: str | None,
     csv: Path | None,
     parquet: Path | None,
     html: Path | None,
+    latex: Path | None,
     metrics: tuple[str, ...],
     actuators: str | None,
     band_deg: float | None,
@@ -91,6 +108,7 @@ def analyze(
     Examples:
       space-robot analyze flights/one
       space-robot analyze flights/one flights/two --plot figures --html flights.html
+      space-robot analyze flights/one --plot figures --width single --format pdf
       space-robot analyze flights/one --from 14 --to 16 --json
       space-robot analyze flights/one --actuators wheels
       space-robot analyze flights/one --band 0.05 --window 10
@@ -115,16 +133,19 @@ def analyze(
     ]
     for path in (
         *(path for _, paths in exports for path in paths.values()),
-        *([html] if html else []),
+        *filter(None, (html, latex)),
     ):
         check_free(path)
     settings = {"band_deg": band_deg, "window_s": window_s}
     budget = PointingBudget.model_validate({k: v for k, v in settings.items() if v is not None})
     figure_set = None
+    if not plot and (formats or width):
+        raise click.UsageError("--format and --width need --plot")
     if plot or html:
         from ..analysis.figures.figure_set import FigureSet
+        from ..analysis.figures.style import parse_width
 
-        figure_set = FigureSet(budget)
+        figure_set = FigureSet(budget, parse_width(width) if width else None)
     reports: dict[str, dict[str, Any]] = {}
     descriptions: dict[str, dict[str, Any]] = {}
     for name, bag in zip(names, bags, strict=True):
@@ -141,17 +162,26 @@ def analyze(
         del log  # before the next is read: a long flight fills a gigabyte
     with ExitStack() as stack:
         if figure_set:
-            folder = plot or Path(stack.enter_context(TemporaryDirectory()))
-            figures = figure_set.save(folder)
+            formats = formats or ("png", "svg")
             if plot:
-                files = ", ".join(str(figure.svg.with_suffix(".png")) for figure in figures)
-                click.echo(f"wrote {files} and .svg", err=True)
+                figures = figure_set.save(plot, formats)
+                files = ", ".join(str(figure.files[0]) for figure in figures)
+                others = " and ".join(["", *(f".{suffix}" for suffix in formats[1:])])
+                click.echo(f"wrote {files}{others}", err=True)
             if html:
                 from ..analysis.report import render
 
+                if not plot or "svg" not in formats:
+                    folder = Path(stack.enter_context(TemporaryDirectory()))
+                    figures = figure_set.save(folder, ["svg"])
                 shown = [(figure.caption, figure.data_uri) for figure in figures]
                 write_text(render(reports, descriptions, shown), html)
                 click.echo(f"wrote {html}", err=True)
+    if latex:
+        from ..analysis.report_tables import latex_table
+
+        write_text(latex_table(reports, descriptions), latex)
+        click.echo(f"wrote {latex}", err=True)
     _print(reports, as_json)
 
 

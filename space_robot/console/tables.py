@@ -1,10 +1,11 @@
-"""Data model of all tables, and their text as Markdown.
+"""Data model of all tables, and their text as Markdown and LaTeX.
 
 `terminal.print_table` prints it on a terminal, ``templates/table.html.j2`` in a page.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
@@ -93,6 +94,46 @@ def cell_text(value: Value, column: Column) -> str:
     if value is None:
         return NONE
     return str(value) if isinstance(value, (str, JudgedCell)) else format(value, column.spec)
+
+
+ESCAPED = str.maketrans(
+    {c: f"\\{c}" for c in "&%$#_{}"}
+    | {"\\": r"\textbackslash{}", "~": r"\textasciitilde{}", "^": r"\textasciicircum{}"}
+    | {"<": "$<$", ">": "$>$", "\u00a0": r"\,"}
+)
+"""What LaTeX would not print as it is; a protected blank is a narrow one, as in units."""
+
+
+def as_latex(table: Table) -> str:
+    """Return a table as LaTeX, in the style of its package booktabs; the title is the caption."""
+    count, rows = len(table.columns), list[str]()
+    for group in table.groups:
+        if group.name:
+            name = group.name.translate(ESCAPED)
+            rows += [r"\midrule", rf"\multicolumn{{{count}}}{{l}}{{\textit{{{name}}}}} \\"]
+        for row in group.rows:
+            cells = (_latex_cell(v, column) for v, column in zip(row, table.columns, strict=True))
+            rows.append(" & ".join(cells) + r" \\")
+    lines = [
+        r"\begin{table}",
+        r"\centering",
+        rf"\caption{{{table.title.translate(ESCAPED)}}}",
+        rf"\begin{{tabular}}{{{''.join('l' if c.is_label else 'r' for c in table.columns)}}}",
+        r"\toprule",
+        " & ".join(column.heading.translate(ESCAPED) for column in table.columns) + r" \\",
+        *rows,
+        *(r"\bottomrule", r"\end{tabular}", r"\end{table}", ""),
+    ]
+    return "\n".join(lines)
+
+
+def _latex_cell(value: Value, column: Column) -> str:
+    if not isinstance(value, float):
+        return cell_text(value, column).translate(ESCAPED)
+    if not math.isfinite(value):
+        return r"$\infty$" if value > 0.0 else "--"
+    digits, _, power = format(value, column.spec).partition("e")
+    return f"${digits.rstrip('.')}" + (rf"\times10^{{{int(power)}}}$" if power else "$")
 
 
 def as_markdown(title: str, tables: Sequence[Table]) -> str:

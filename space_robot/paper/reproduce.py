@@ -258,7 +258,7 @@ def reproduce(
     folder.parent.mkdir(parents=True, exist_ok=True)
     with TemporaryDirectory(dir=folder.parent, prefix=".reproduce-") as temporary:
         work = Path(temporary) / folder.name
-        figures = FigureFolder(work / "figures", png=not brief)
+        figures = FigureFolder(work / "figures", ("svg",) if brief else ("png", "svg"))
         figures.path.mkdir(parents=True)
         planned = list(plan(rows, brief))
         order = sorted(planned, key=lambda flight: flight[0].shown != flight[1])  # longest first

@@ -20,6 +20,8 @@ from ..torques import CHATTER_FREQUENCY
 from .single_flight import BASE_AXES, JUNCTION_HALF_WIDTH
 from .style import (
     GREY,
+    NARROW_PAGE,
+    PAGE_WIDTH,
     grid,
     house_style,
     legend_above,
@@ -74,7 +76,7 @@ class BaseTorque(NamedTuple):
 
 
 @house_style()
-def junctions(flights: Mapping[str, BaseTorque]) -> Figure:
+def junctions(flights: Mapping[str, BaseTorque], width: float = PAGE_WIDTH) -> Figure:
     """Draw the base torque x of all laws at the first junction of the mission's segments.
 
     All panels have the same scale. A law with a much larger range than most does not affect it: its
@@ -87,8 +89,8 @@ def junctions(flights: Mapping[str, BaseTorque]) -> Figure:
     ]
     if not moments:
         return page(12.0, "None of these flights passes a junction of two segments.")
-    columns = min(2, len(flights))
-    figure = page(12.0 + 45.0 * math.ceil(len(flights) / columns))
+    columns = 1 if width < NARROW_PAGE else min(2, len(flights))
+    figure = page(12.0 + 45.0 * math.ceil(len(flights) / columns), width=width)
     interval = -JUNCTION_HALF_WIDTH, JUNCTION_HALF_WIDTH
     panels = _draw_side_by_side(figure, columns, flights, min(moments), interval, 1)
     for axes in panels:
@@ -99,7 +101,7 @@ def junctions(flights: Mapping[str, BaseTorque]) -> Figure:
 
 
 @house_style()
-def chatter(flights: Mapping[str, BaseTorque]) -> Figure:
+def chatter(flights: Mapping[str, BaseTorque], width: float = PAGE_WIDTH) -> Figure:
     """Draw a short interval of base torque on one scale, and the spectrum of the whole flight.
 
     The interval begins at a quarter of the longest flight: when the arm is fastest, if the mission
@@ -107,9 +109,10 @@ def chatter(flights: Mapping[str, BaseTorque]) -> Figure:
     """
     start = min(flight.start for flight in flights.values())
     moment = start + (max(flight.end for flight in flights.values()) - start) / 4.0
-    columns = math.ceil(len(flights) / math.ceil(len(flights) / 4))
+    rows = math.ceil(len(flights) / (2 if width < NARROW_PAGE else 4))
+    columns = math.ceil(len(flights) / rows)
     height, spectrum_height = 20.0 + 38.0 * math.ceil(len(flights) / columns), 90.0
-    figure = page(height + spectrum_height)
+    figure = page(height + spectrum_height, width=width)
     parts = figure.add_gridspec(2, 1, height_ratios=(height, spectrum_height))
     above, below = figure.add_subfigure(parts[0]), figure.add_subfigure(parts[1])
     interval = 0.0, CHATTER_STRETCH
@@ -123,7 +126,8 @@ def chatter(flights: Mapping[str, BaseTorque]) -> Figure:
     }
     _draw_spectra(below.add_subplot(), spectra)
     names = [n if len(f) else f"{n}: too short" for n, (f, _) in spectra.items()]
-    legend_above(below, names, dashed=True)
+    if len(names) > 1:
+        legend_above(below, names, dashed=True)
     return figure
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import base64
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Collection, Iterable, Iterator
 from functools import partial
 from pathlib import Path
 from typing import NamedTuple
@@ -27,19 +27,20 @@ from .overlay import (
     ripple,
 )
 from .single_flight import control_results, desired_joints, kind_figure, limit_cycle
-from .style import save_figure
+from .style import PAGE_WIDTH, save_figure
 
 
 class SavedFigure(NamedTuple):
     """A figure on disk."""
 
     caption: str
-    svg: Path
+    files: tuple[Path, ...]
 
     @property
     def data_uri(self) -> str:
         """Return the SVG as a data URI, for a self-contained page."""
-        return "data:image/svg+xml;base64," + base64.b64encode(self.svg.read_bytes()).decode()
+        svg = self.files[0].with_suffix(".svg")
+        return "data:image/svg+xml;base64," + base64.b64encode(svg.read_bytes()).decode()
 
 
 class Drawing(NamedTuple):
@@ -58,17 +59,17 @@ class FigureFolder(NamedTuple):
     """Folder of figures; can be used in several processes."""
 
     path: Path
-    png: bool
-    """True to write PNG files beside the SVG files."""
+    formats: Collection[str]
+    """Of png, svg, pdf."""
 
     def save(self, figure: Figure, stem: str) -> None:
         """Write a figure."""
-        save_figure(figure, self.path / stem, png=self.png)
+        save_figure(figure, self.path / stem, self.formats)
 
     def saved(self, captions: Iterable[tuple[str, str]]) -> list[SavedFigure]:
         """Return those of the figures that were written, from pairs of stem and caption."""
         return [
-            SavedFigure(caption, path)
+            SavedFigure(caption, (path,))
             for stem, caption in captions
             if (path := self.path / f"{stem}.svg").is_file()
         ]
@@ -81,9 +82,13 @@ class FigureSet:
     torques are overlaid as norms of the columns of Table V.
     """
 
-    def __init__(self, budget: PointingBudget | None = None) -> None:
-        """``budget``: of the base's pointing; None: the default."""
-        self._budget = budget or PointingBudget()
+    def __init__(self, budget: PointingBudget | None = None, width: float | None = None) -> None:
+        """``budget``: of the base's pointing; ``width``: mm. None: the default.
+
+        Figures of a certain width have no title: they are for a paper, where a caption has it.
+        """
+        self._budget, self._width = budget or PointingBudget(), width or PAGE_WIDTH
+        self._has_titles = width is None
         self._curves: dict[str, FlightCurves] = {}
         self._missions: dict[bytes, tuple[str, Figure]] = {}
         self._first: Figure | None = None
@@ -93,17 +98,18 @@ class FigureSet:
     def add(self, name: str, log: FlightLog) -> None:
         """Add a flight."""
         reference = log.reference_joints[:: max(1, log.ticks // 100)]
-        self._missions.setdefault(reference.tobytes(), (name, desired_joints(log)))
+        self._missions.setdefault(reference.tobytes(), (name, desired_joints(log, self._width)))
         if not self._curves:
-            self._first = control_results(log, title(name, log))
+            heading = title(name, log) if self._has_titles else ""
+            self._first = control_results(log, heading, self._width)
         self._curves[name] = FlightCurves.of(log, self._budget)
-        if own := dict(_own_drawings(log.longest_stretch())):
+        if own := dict(_own_drawings(log.longest_stretch(), self._width)):
             self._own[name] = own
 
-    def save(self, folder: Path) -> list[SavedFigure]:
-        """Draw all figures with data into ``folder``, PNG and SVG; existing files are replaced."""
+    def save(self, folder: Path, formats: Collection[str] = ("png", "svg")) -> list[SavedFigure]:
+        """Draw all figures with data into ``folder``; existing files are replaced."""
         return [
-            SavedFigure(drawing.caption, save_figure(figure, folder / stem)[-1])
+            SavedFigure(drawing.caption, save_figure(figure, folder / stem, formats))
             for stem, drawing in self.drawings().items()
             if (figure := drawing.draw()).axes
         ]
@@ -112,6 +118,10 @@ class FigureSet:
         """Return the available figures by file name, without drawing them."""
         curves, drawings = self._curves, dict[str, Drawing]()
         torques = {n: c.base_torque for n, c in curves.items() if c.base_torque is not None}
+
+        def add(stem: str, caption: str, draw: Callable[..., Figure], flights: object) -> None:
+            drawings[stem] = Drawing(caption, partial(draw, flights, width=self._width))
+
         for number, (name, figure) in enumerate(self._missions.values(), start=1):
             suffix, whose = (f"_{number}", f" of {name}") if len(self._missions) > 1 else ("", "")
             caption = f"Desired joint angles{whose} (Fig. 5)"
@@ -121,43 +131,36 @@ class FigureSet:
             drawings["control_results"] = Drawing.of(caption, self._first)
         else:
             caption = "Errors and torques, norms over each group of axes (Figs. 6 to 9)"
-            drawings["control_results"] = Drawing(caption, partial(errors_and_torques, curves))
+            add("control_results", caption, errors_and_torques, curves)
         if torques:
-            drawings |= {
-                "junctions": Drawing(
-                    "Base torque x where two motions meet", partial(junctions, torques)
-                ),
-                "chatter": Drawing(
-                    "A stretch of base torque, and its spectrum", partial(chatter, torques)
-                ),
-            }
-        drawings["ripple"] = Drawing("Spectrum of the torques' ripple", partial(ripple, curves))
+            add("junctions", "Base torque x where two motions meet", junctions, torques)
+            add("chatter", "A stretch of base torque, and its spectrum", chatter, torques)
+        add("ripple", "Spectrum of the torques' ripple", ripple, curves)
         for number, (name, own) in enumerate(self._own.items(), start=1):
             suffix, whose = (f"_{number}", f" of {name}") if len(curves) > 1 else ("", "")
             for stem, drawing in own.items():
                 caption = f"{drawing.caption}{whose}"
                 drawings[f"{stem}{suffix}"] = drawing._replace(caption=caption)
         if torques:
-            caption = "The base's pointing error; dotted: the band"
-            drawings["base_pointing"] = Drawing(caption, partial(base_pointing, curves))
+            caption = "The base's pointing error; limit: the band"
+            add("base_pointing", caption, base_pointing, curves)
         caption = "The end effector's pointing error in the inertial frame"
-        drawings["pointing"] = Drawing(caption, partial(pointing, curves))
-        caption = "Time from a state's sending to its command's"
-        drawings["latency"] = Drawing(caption, partial(latency_histogram, curves))
+        add("pointing", caption, pointing, curves)
+        add("latency", "Time from a state's sending to its command's", latency_histogram, curves)
         return drawings
 
 
-def _own_drawings(log: FlightLog) -> Iterator[tuple[str, Drawing]]:
+def _own_drawings(log: FlightLog, width: float) -> Iterator[tuple[str, Drawing]]:
     flight = AnalysedLog(log)
     for name, kind in KINDS.items() if log.ticks else ():
         drawn = (
             [q for _, q in flown_quantities(flight, [name]) if q.is_drawn] if kind.figure else []
         )
         if drawn:
-            yield kind.figure, Drawing.of(kind.caption, kind_figure(log, drawn))
+            yield kind.figure, Drawing.of(kind.caption, kind_figure(log, drawn, width))
         if any(quantity.are_pulses for quantity in drawn):
             caption = "The attitude's limit cycle: rate error over attitude error"
-            yield "limit_cycle", Drawing.of(caption, limit_cycle(log))
+            yield "limit_cycle", Drawing.of(caption, limit_cycle(log, width))
 
 
 def title(name: str, log: FlightLog) -> str:

@@ -23,11 +23,14 @@ from ..plotted import PlottedQuantity, flown_quantities
 from ..torques import RippleSpectrum, ripple_spectrum
 from .base_torque import BaseTorque
 from .style import (
-    GREY,
+    NARROW_PAGE,
+    PAGE_WIDTH,
     LineStyle,
     house_style,
     legend_above,
+    legend_inside,
     mark_events,
+    mark_limits,
     page,
     plot_lines,
     plot_spectrum,
@@ -99,37 +102,39 @@ class _Panel(NamedTuple):
 
 
 @house_style()
-def errors_and_torques(flights: Mapping[str, FlightCurves]) -> Figure:
+def errors_and_torques(flights: Mapping[str, FlightCurves], width: float = PAGE_WIDTH) -> Figure:
     """Draw Figs. 6 to 9 of several flights: sizes of errors (left, logarithmic) and torques."""
     errors = [panel for panel in _panels(flights, "attitude", "joints") if panel.is_error]
-    return _draw([errors, _panels(flights, "torques")], flights)
+    torques = _panels(flights, "torques")
+    columns = [errors + torques] if width < NARROW_PAGE else [errors, torques]
+    return _draw(columns, flights, width)
 
 
 @house_style()
-def pointing(flights: Mapping[str, FlightCurves]) -> Figure:
+def pointing(flights: Mapping[str, FlightCurves], width: float = PAGE_WIDTH) -> Figure:
     """Draw the end effector's errors of boresight, rotation and position, and the base's drift."""
     panels = _panels(flights, "tool")
     if not panels:
         return page(12.0, "No robot is known for these flights, so no pointing error.")
-    return _draw([panels + _panels(flights, "base")], flights)
+    return _draw([panels + _panels(flights, "base")], flights, width)
 
 
 @house_style()
-def base_pointing(flights: Mapping[str, FlightCurves]) -> Figure:
+def base_pointing(flights: Mapping[str, FlightCurves], width: float = PAGE_WIDTH) -> Figure:
     """Draw the base's pointing errors and the band: half cone, about the axis that points, all."""
     panels = _panels(flights, "pointing")
     if not panels:
         return page(12.0, "Nothing turned the base of these flights, so no pointing error.")
-    return _draw([panels], flights)
+    return _draw([panels], flights, width)
 
 
 @house_style()
-def latency_histogram(flights: Mapping[str, FlightCurves]) -> Figure:
+def latency_histogram(flights: Mapping[str, FlightCurves], width: float = PAGE_WIDTH) -> Figure:
     """Draw the histogram of latencies, for flights that were flown as a graph."""
     known = {name: s.latency_ms for name, s in flights.items() if s.latency_ms is not None}
     if not known:
         return page(12.0, "None of these flights was flown as a graph, so no latency.")
-    figure = page(80.0)
+    figure = page(80.0, width=width)
     axes = figure.add_subplot()
     low = max(min(float(values.min()) for values in known.values()), 1e-3)
     high = max(float(values.max()) for values in known.values())
@@ -148,19 +153,19 @@ def latency_histogram(flights: Mapping[str, FlightCurves]) -> Figure:
     axes.xaxis.set_major_formatter("{x:g}")
     axes.xaxis.set_minor_formatter("")
     axes.yaxis.set_major_formatter("{x:g}")
-    legend_above(figure, list(known), dashed=True)
+    legend_inside(axes, list(known), dashed=True)
     return figure
 
 
 @house_style()
-def ripple(flights: Mapping[str, FlightCurves]) -> Figure:
+def ripple(flights: Mapping[str, FlightCurves], width: float = PAGE_WIDTH) -> Figure:
     """Draw the spectral density of the ripple, one panel per group of axes (mean of the axes)."""
     known = {name: s.ripple for name, s in flights.items() if s.ripple is not None}
     if not known:
         return page(12.0, "None of these flights has a known robot and is long enough for ripple.")
     columns = [flights[name].torque_axes for name in known]
     groups = {key: axes for column in columns for key, axes in column.items()}
-    figure = page(18.0 + 55.0 * len(groups))
+    figure = page(18.0 + 55.0 * len(groups), width=width)
     panels = figure.subplots(len(groups), 1, sharex=True, squeeze=False)[:, 0]
     names = list(flights)
     for panel, key in zip(panels, groups, strict=True):
@@ -178,14 +183,15 @@ def ripple(flights: Mapping[str, FlightCurves]) -> Figure:
     panels[-1].set_xlabel("frequency (Hz)")
     panels[-1].xaxis.set_major_formatter("{x:g}")
     figure.align_ylabels()
-    legend_above(figure, names, dashed=True)
+    if len(names) > 1:
+        legend_above(figure, names, dashed=True)
     return figure
 
 
-def _draw(columns: list[list[_Panel]], flights: Mapping[str, FlightCurves]) -> Figure:
+def _draw(columns: list[list[_Panel]], flights: Mapping[str, FlightCurves], width: float) -> Figure:
     rows, names = len(columns[0]), list(flights)
     events = np.unique(np.concatenate([curves.events for curves in flights.values()]))
-    figure = page(18.0 + 38.0 * rows)
+    figure = page(18.0 + 38.0 * rows, width=width)
     grid = figure.subplots(rows, len(columns), sharex="col", squeeze=False)
     for panels, column in zip(columns, grid.T, strict=True):
         for axes, panel in zip(column, panels, strict=True):
@@ -193,7 +199,8 @@ def _draw(columns: list[list[_Panel]], flights: Mapping[str, FlightCurves]) -> F
             mark_events(axes, events)
         column[-1].set_xlabel("time (s)")
     figure.align_ylabels()
-    legend_above(figure, names, dashed=True)
+    if len(names) > 1:
+        legend_above(figure, names, dashed=True)
     return figure
 
 
@@ -201,6 +208,8 @@ def _draw_panel(axes: Axes, panel: _Panel, names: list[str]) -> None:
     wildest_first = sorted(panel.curves, key=lambda name: -total_variation(panel.curves[name][1]))
     for depth, name in enumerate(wildest_first):  # at the back, so that it does not hide the others
         time, value = panel.curves[name]
+        if panel.is_error:  # zeros have no place on its logarithmic scale
+            value = np.where(value > 0.0, value, np.nan)
         plot_lines(axes, time, value[:, np.newaxis], looks=[names.index(name)], dashed=True)
         axes.get_lines()[-1].set_zorder(2.0 + 0.01 * depth)
     if panel.is_error:
@@ -210,8 +219,7 @@ def _draw_panel(axes: Axes, panel: _Panel, names: list[str]) -> None:
             axes.set_yscale("log", nonpositive="mask")
             axes.set_ylim(bottom=0.5 * min(usual))
     if panel.limit:
-        axes.axhline(panel.limit, color=GREY, linewidth=0.8, linestyle=":")
-        axes.set_ylim(top=max(axes.get_ylim()[1], 2.0 * panel.limit))
+        mark_limits(axes, [panel.limit], np.concatenate([v for _, v in panel.curves.values()]))
     axes.set_ylabel(panel.label)
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.gridspec import GridSpec
+from matplotlib.gridspec import SubplotSpec
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
@@ -22,12 +22,15 @@ from ..mission_plan import PlannedSegment
 from ..plotted import AXES as XYZ
 from ..plotted import PlottedQuantity, flown_quantities
 from .style import (
-    GREY,
+    NARROW_PAGE,
     PAGE_WIDTH,
     LineStyle,
+    binned,
     house_style,
     legend_above,
+    legend_inside,
     mark_events,
+    mark_limits,
     mark_moments,
     page,
     plot_lines,
@@ -50,14 +53,14 @@ POINTS = 6000
 
 
 @house_style()
-def desired_joints(log: FlightLog) -> Figure:
+def desired_joints(log: FlightLog, width: float = PAGE_WIDTH) -> Figure:
     """Draw Fig. 5: the desired joint angles over time, with markers at the waypoints.
 
     Prismatic joints have a separate panel.
     """
     time, waypoints = log.time, waypoint_ticks(log)
     panels = [quantity for _, quantity in flown_quantities(AnalysedLog(log), ["positions"])]
-    figure = page(80.0 if len(panels) == 1 else 120.0)
+    figure = page(80.0 if len(panels) == 1 else 120.0, width=width)
     below = figure.subplots(len(panels), 1, sharex=True, squeeze=False)[:, 0]
     for axes, panel in zip(below, panels, strict=True):
         assert panel.wanted is not None
@@ -67,13 +70,16 @@ def desired_joints(log: FlightLog) -> Figure:
         kind = "angle" if panel.unit == "deg" else "position"
         axes.set_ylabel(f"desired joint {kind} ({panel.unit})")
     below[-1].set_xlabel("time (s)")
-    legend_above(figure, log.joint_names, dashed=True)
+    if len(panels) == 1:
+        legend_inside(below[0], log.joint_names, dashed=True)
+    else:
+        legend_above(figure, log.joint_names, dashed=True)
     return figure
 
 
 @house_style()
-def control_results(log: FlightLog, title: str) -> Figure:
-    """Draw Figs. 6 to 9: errors and torques of the base (left) and of the joints (right).
+def control_results(log: FlightLog, title: str, width: float = PAGE_WIDTH) -> Figure:
+    """Draw Figs. 6 to 9: errors and torques of the base, and beside or below of the joints.
 
     Below, the torques are enlarged at the junctions of the mission's segments that the flight has
     reached; vertical lines are captures and releases. Without base actuators the base's drift is
@@ -83,16 +89,19 @@ def control_results(log: FlightLog, title: str) -> Figure:
     error, torque, time = tracking_error(log)[:, 3:], log.applied_torque, log.time
     moments = time[junction_ticks(log)[:MOST_JUNCTIONS]]
     rows = 3 if len(moments) else 2
-    figure = page(22.0 + 46.0 * rows, title)
-    cells = figure.add_gridspec(rows, 2)
+    is_narrow = width < NARROW_PAGE
+    figure = page(22.0 + (68.0 if is_narrow else 46.0) * rows, title, width)
+    heights = 2 * [1.0, 1.0, 1.4][:rows] if is_narrow else None
+    cells = figure.add_gridspec(*(2 * rows, 1) if is_narrow else (rows, 2), height_ratios=heights)
     for column, (values, part, names, error_label, torque_label) in enumerate(
         (
             (attitude.values, slice(0, 3), BASE_AXES, attitude.label, "base torque (N m)"),
             (error, slice(3, None), log.joint_names, *_joint_labels(log)),
         )
     ):
-        errors = figure.add_subplot(cells[0, column])
-        torques = figure.add_subplot(cells[1, column], sharex=errors)
+        first = (column * rows, 0) if is_narrow else (0, column)
+        errors = figure.add_subplot(cells[first])
+        torques = figure.add_subplot(cells[first[0] + 1, first[1]], sharex=errors)
         plot_lines(errors, time, values)
         plot_lines(torques, time, torque[:, part])
         for axes in (errors, torques):
@@ -101,9 +110,10 @@ def control_results(log: FlightLog, title: str) -> Figure:
         errors.tick_params(labelbottom=False)
         errors.set_ylabel(error_label)
         torques.set(xlabel="time (s)", ylabel=torque_label)
-        legend_above(errors, names, dashed=False, width=PAGE_WIDTH / 2 - 20)
+        legend_above(errors, names, dashed=True)
         if len(moments):
-            enlarged = _enlarge(figure, cells, column, moments, time, torque[:, part])
+            cell = cells[first[0] + 2, first[1]]
+            enlarged = _enlarge(figure, cell, moments, time, torque[:, part])
             enlarged.set_ylabel(torque_label)
         figure.align_ylabels([errors, torques])
     return figure
@@ -120,10 +130,8 @@ def _joint_labels(log: FlightLog) -> tuple[str, str]:
     return f"joint error (rad; {few}: m)", f"joint torque (N m; {few}: N)"
 
 
-def _enlarge(
-    figure: Figure, cells: GridSpec, column: int, moments: Array, time: Array, torque: Array
-) -> Axes:
-    below = cells[2, column].subgridspec(1, len(moments))
+def _enlarge(figure: Figure, cell: SubplotSpec, moments: Array, time: Array, torque: Array) -> Axes:
+    below = cell.subgridspec(1, len(moments))
     panels = below.subplots(sharey=True, squeeze=False)[0].tolist()
     for axes, moment in zip(panels, moments, strict=True):
         near = np.abs(time - moment) < JUNCTION_HALF_WIDTH + 1e-9
@@ -140,10 +148,12 @@ def _enlarge(
 
 
 @house_style()
-def kind_figure(log: FlightLog, quantities: Sequence[PlottedQuantity]) -> Figure:
+def kind_figure(
+    log: FlightLog, quantities: Sequence[PlottedQuantity], width: float = PAGE_WIDTH
+) -> Figure:
     """Draw quantities of a kind below one another, with their limits; pulses as a raster."""
     heights = [60.0 if quantity.are_pulses else 45.0 for quantity in quantities]
-    figure = page(18.0 + sum(heights))
+    figure = page(18.0 + sum(heights), width=width)
     panels = figure.subplots(len(heights), 1, sharex=True, squeeze=False, height_ratios=heights)[
         :, 0
     ]
@@ -153,26 +163,28 @@ def kind_figure(log: FlightLog, quantities: Sequence[PlottedQuantity]) -> Figure
         if quantity.are_pulses:
             _draw_pulses(axes, log.time, quantity.values, log.timebase.period)
             continue
-        plot_lines(axes, log.time, quantity.values)
-        for limit in {*quantity.limits} - {0.0}:
-            for side in (-limit, limit):
-                axes.axhline(side, color=GREY, linewidth=0.8, linestyle=":", zorder=1.5)
+        looks = _looks(log, quantity.labels)
+        plot_lines(axes, log.time, quantity.values, looks=looks)
+        mark_limits(axes, quantity.limits, quantity.values)
         axes.set_ylabel(quantity.label)
         if not is_common:
-            legend_above(axes, quantity.labels, dashed=False)
+            legend_inside(axes, quantity.labels, dashed=True, looks=looks)
     panels[-1].set_xlabel("time (s)")
     figure.align_ylabels()
     if is_common:
-        legend_above(figure, lines[0].labels, dashed=False)
+        looks = _looks(log, lines[0].labels)
+        legend_above(figure, lines[0].labels, dashed=True, looks=looks)
     return figure
 
 
+def _looks(log: FlightLog, labels: Sequence[str]) -> list[int]:
+    joints = list(log.joint_names)  # a joint looks the same in all figures
+    return [joints.index(name) if name in joints else k for k, name in enumerate(labels)]
+
+
 def _draw_pulses(axes: Axes, time: Array, is_open: Array, period: float) -> None:
-    length = max(1, -(-len(time) // BINS))
-    starts = np.arange(0, len(time), length)
-    counts = np.diff(np.append(starts, len(time)))
-    share = np.add.reduceat(np.nan_to_num(is_open), starts, axis=0) / counts[:, np.newaxis]
-    count = is_open.shape[1]
+    length, count = max(1, -(-len(time) // BINS)), is_open.shape[1]
+    share = binned(time, np.nan_to_num(is_open), length)[2]
     axes.imshow(
         share.T,
         cmap="Greys",
@@ -180,7 +192,7 @@ def _draw_pulses(axes: Axes, time: Array, is_open: Array, period: float) -> None
         vmax=1.0,
         aspect="auto",
         interpolation="nearest",
-        extent=(time[0] - period, time[0] + (starts[-1] + length - 1) * period, count + 0.5, 0.5),
+        extent=(time[0] - period, time[0] + (len(share) * length - 1) * period, count + 0.5, 0.5),
     )
     axes.grid(visible=False)
     axes.yaxis.set_major_locator(MaxNLocator(integer=True))
@@ -189,9 +201,9 @@ def _draw_pulses(axes: Axes, time: Array, is_open: Array, period: float) -> None
 
 
 @house_style()
-def limit_cycle(log: FlightLog) -> Figure:
+def limit_cycle(log: FlightLog, width: float = PAGE_WIDTH) -> Figure:
     """Draw the base's rate error over its attitude error, both about the base's axes."""
-    figure, every = page(90.0), max(1, log.ticks // POINTS)
+    figure, every = page(90.0, width=width), max(1, log.ticks // POINTS)
     axes = figure.subplots()
     angle, rate = attitude_angles(log)[::every], -np.degrees(relative_rate(log)[::every])
     for i in range(3):
@@ -205,7 +217,7 @@ def limit_cycle(log: FlightLog) -> Figure:
             markevery=[len(angle) // 2],
         )
     axes.set(xlabel="attitude error (deg)", ylabel="rate error (deg/s)")
-    legend_above(figure, BASE_AXES, dashed=False)
+    legend_inside(axes, BASE_AXES, dashed=False)
     return figure
 
 
@@ -227,7 +239,7 @@ def draw_plan(robot: Robot, segments: Sequence[PlannedSegment], stem: Path) -> t
     for panel, (at, values, label, names) in zip(axes, panels, strict=True):
         plot_lines(panel, np.concatenate(at), np.concatenate(values))
         panel.set_ylabel(label)
-        legend_above(panel, list(names), dashed=False)
+        legend_inside(panel, list(names), dashed=True)
         mark_moments(panel, np.array([segment.piece.end for segment in segments[:-1]]))
     axes[-1].set_xlabel("time (s)")
     return save_figure(figure, stem)

@@ -1,15 +1,21 @@
 """Common style of all figures, and writing of their files.
 
 The colours are those of Okabe and Ito, safe for colour-blind readers, without yellow, which is too
-pale for lines. Consecutive colours also differ in brightness, and each line has a marker of its
-own shape, so that lines can be distinguished in greyscale.
+pale for lines. Consecutive colours also differ in brightness, and each line has dashes and markers
+of its own, so that lines can be distinguished in greyscale. Where there are more samples than
+pixels, a line is the mean of each pixel's samples, in an envelope from their minimum to their
+maximum.
 """
 
 from __future__ import annotations
 
+import io
+import math
+import re
 import textwrap
 import warnings
-from collections.abc import Sequence
+from collections.abc import Collection, Mapping, Sequence
+from contextlib import suppress
 from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -23,6 +29,7 @@ from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
 from space_robot_msgs_py.config.text import shortened
+from space_robot_msgs_py.config.validation import one_of, short
 from space_robot_msgs_py.errors import InputError
 
 from ...console.files import atomic_file, make_folder
@@ -36,12 +43,23 @@ RESOLUTION = 150
 """Resolution of a PNG, dpi."""
 PAGE_WIDTH = 180.0
 """Width of a page, mm: A4 without margins."""
+WIDTHS = {"single": 88.9, "double": 181.9}
+"""Widths of one and of two columns of IEEE's journals, mm."""
+NARROW_PAGE = 120.0
+"""Width, mm, below which panels stand below one another."""
+NO_DATES = {
+    "png": {"Software": None},
+    "svg": {"Date": None, "Creator": None},
+    "pdf": {"CreationDate": None, "Creator": None, "Producer": None},
+}
+"""Formats of files, with metadata that are the same at any time."""
+NEAR_LIMIT = 2.0
+"""Multiple of the largest value up to which a limit is drawn, instead of written."""
 GREY = "#707070"
 COLOURS = ("#000000", "#E69F00", "#0072B2", "#CC79A7", "#009E73", "#56B4E9", "#D55E00")
 MARKERS = ("o", "s", "^", "D", "v", "<", "P", ">", "*")
 DASHES: tuple[Any, ...] = ("-", "--", "-.", (0, (5, 1, 1, 1, 1, 1)), (0, (8, 2)), (0, (2, 1)))
-STRETCHES = 250
-"""Number of intervals of a long line, each narrower than the line width."""
+PATH, DIGITS = re.compile(rb' d="[^"]*"'), re.compile(rb"(\.\d\d)\d+")
 MARKS = 4
 """Number of markers per line."""
 
@@ -64,9 +82,23 @@ class LineStyle(NamedTuple):
         return cls(*(styles[index % len(styles)] for styles in (COLOURS, MARKERS, DASHES)))
 
 
-def page(height: float, title: str = "") -> Figure:
-    """Return an empty page of ``height`` mm, with a title unless it is empty."""
-    figure = Figure(figsize=(PAGE_WIDTH / 25.4, height / 25.4), dpi=RESOLUTION)
+def parse_width(width: str | float) -> float:
+    """Return the width of a figure in mm, from one of `WIDTHS` or a number of mm.
+
+    Raises:
+        InputError: it is neither, or out of range.
+    """
+    mm = math.nan
+    with suppress(TypeError, ValueError):
+        mm = float(WIDTHS.get(str(width), width))
+    if not 60.0 <= mm <= 500.0:
+        raise InputError(f"width {short(width)}: {', '.join(WIDTHS)}, or 60 to 500 mm expected")
+    return mm
+
+
+def page(height: float, title: str = "", width: float = PAGE_WIDTH) -> Figure:
+    """Return an empty page of ``height`` and ``width`` mm, with a title unless it is empty."""
+    figure = Figure(figsize=(width / 25.4, height / 25.4), dpi=RESOLUTION)
     if title:
         figure.suptitle(plain(textwrap.fill(shortened(title, 5 * MOST_LETTERS), 95)))
     return figure
@@ -89,62 +121,67 @@ def plot_lines(
 ) -> None:
     """Plot the columns of ``values``, those with the largest variation at the back.
 
+    With more than two samples a pixel, each is the mean in an envelope from minimum to maximum.
+
     Args:
         axes: to plot in.
         x: (N,) in the unit of the horizontal axis.
         values: (N, m), one line per column; only finite values are drawn.
         looks: style numbers of the columns; by default 0, 1, ...
         marks: samples with a marker; by default `MARKS` per line, at different samples.
-        dashed: use dashes, too; not suitable for lines with chatter.
+        dashed: use dashes, too; envelopes always do. Not suitable for lines with chatter.
         steps: draw each value as constant since the previous sample.
     """
     looks = range(values.shape[1]) if looks is None else looks
     wildness = np.array([total_variation(column) for column in values.T])
+    length = -(-len(x) // max(1, int(axes.get_window_extent().width)))
+    is_long = length > 2
+    if is_long:
+        ends = x[[0, -1]]
+        x, low, values, high = binned(x, values, length)
+        x[[0, -1]] = ends
+        marks = None if marks is None else np.minimum(marks // length, len(x) - 1)
     for depth, column in enumerate(np.argsort(-wildness, kind="stable").tolist()):
-        index, shown = looks[column], _finite(values[:, column])
-        look = LineStyle.of(index)
-        marked = scattered(len(x), index, max(looks) + 1) if marks is None else marks
-        drawn = np.union1d(thinned(shown), marked)
+        look, zorder = LineStyle.of(looks[column]), 2.0 + 0.01 * depth
+        if is_long:
+            area = axes.fill_between(x, low[:, column], high[:, column], color=look.colour)
+            area.set(alpha=0.3, linewidth=0.3, zorder=zorder - 0.3)
+        marked = scattered(len(x), looks[column], max(looks) + 1) if marks is None else marks
         axes.plot(
-            x[drawn],
-            shown[drawn],
+            x,
+            _finite(values[:, column]),
             color=look.colour,
-            linestyle=look.dashes if dashed else "-",
+            linestyle=look.dashes if dashed or is_long else "-",
             marker=look.marker,
-            markevery=np.searchsorted(drawn, marked).tolist(),
-            zorder=2.0 + 0.01 * depth,
+            markevery=marked.tolist(),
+            zorder=zorder,
             drawstyle="steps-pre" if steps else "default",
         )
 
 
-def _finite(column: Array) -> Array:
-    return np.where(np.isfinite(column), column, np.nan)
+def binned(x: Array, values: Array, length: int) -> tuple[Array, Array, Array, Array]:
+    """Return places, minima, means and maxima of each ``length`` samples, and of those left over.
+
+    Values that are not finite are left out; NaN: there is no other.
+    """
+    starts = np.arange(0, len(x), length)
+    values = _finite(values)
+    counts = np.add.reduceat(np.isfinite(values), starts, axis=0, dtype=np.float64)
+    counts[counts == 0.0] = np.nan
+    with np.errstate(over="ignore", invalid="ignore"):
+        means = np.add.reduceat(np.nan_to_num(values), starts, axis=0) / counts
+    low, high = (f.reduceat(values, starts, axis=0) for f in (np.fmin, np.fmax))
+    return x[np.minimum(starts + length // 2, len(x) - 1)], low, means, high
+
+
+def _finite(values: Array) -> Array:
+    return np.where(np.isfinite(values), values, np.nan)
 
 
 def total_variation(column: Array) -> float:
     """Return the way up and down of the finite values of a column."""
     with np.errstate(over="ignore"):
         return float(np.nansum(np.abs(np.diff(_finite(column)))))
-
-
-def thinned(signal: Array, stretches: int = STRETCHES) -> Indices:
-    """Return the indices of minimum and maximum of each of ``stretches`` intervals, and both ends.
-
-    They give the same line as all samples, with half the time and file size: no peak is lost, and
-    chatter keeps its full width. NaN is chosen only if an interval has no other values.
-    """
-    last = len(signal) - 1
-    length = -(-len(signal) // stretches)
-    if length <= 2:
-        return np.arange(len(signal))
-    starts = np.arange(0, len(signal), length)
-    padded = np.pad(signal, (0, len(starts) * length - len(signal)), mode="edge")
-    rows = padded.reshape(-1, length)
-    lowest = np.argmin(np.where(np.isnan(rows), np.inf, rows), axis=1)
-    highest = np.argmax(np.where(np.isnan(rows), -np.inf, rows), axis=1)
-    kept = np.concatenate([[0], starts + lowest, starts + highest, [last]])
-    chosen: Indices = np.unique(np.minimum(kept, last))
-    return chosen
 
 
 def scattered(samples: int, index: int, count: int) -> Indices:
@@ -178,22 +215,58 @@ def mark_events(axes: Axes, times: Array) -> None:
     mark_moments(axes, times, "-")
 
 
-def legend_above(
-    where: Axes | FigureBase, names: Sequence[str], *, dashed: bool, width: float = PAGE_WIDTH - 20
-) -> Legend:
-    """Draw a legend of lines, in the order of their styles, above a figure or a panel.
+def mark_limits(axes: Axes, limits: Sequence[float], values: Array) -> None:
+    """Draw limits of either sign as lines; those far beyond the values are written above."""
+    largest, is_log = np.nanmax(np.abs(values), initial=0.0), axes.get_yscale() == "log"
+    near = sorted({limit for limit in limits if 0.0 < limit <= NEAR_LIMIT * largest})
+    for limit in near:
+        for side in (limit,) if is_log else (-limit, limit):
+            axes.axhline(side, color=GREY, linewidth=0.8, linestyle=":", zorder=1.5)
+    if far := sorted({limit for limit in limits if limit} - {*near}):
+        text = f"limit {', '.join(f'{limit:g}' for limit in far)}"
+        axes.set_title(text, loc="right", color=GREY)
 
-    ``dashed``: as in `plot_lines`; ``width``: what is available, mm.
+
+def legend_inside(
+    axes: Axes, names: Sequence[str], *, dashed: bool, looks: Sequence[int] | None = None
+) -> None:
+    """Draw a legend of lines in the emptiest part of a panel; above it if it would cover a line."""
+    place = {"loc": "best", "borderaxespad": 0.8, "frameon": True, "edgecolor": "none"}
+    legend = legend_above(axes, names, dashed=dashed, looks=looks, place=place)
+    assert isinstance(axes.figure, Figure)
+    axes.figure.draw_without_rendering()
+    box = legend.get_window_extent().padded(2.0)
+    lines = [line for line in axes.get_lines() if line.get_transform() is axes.transData]
+    drawn = [line.get_path() for line in lines]
+    drawn += [path for area in axes.collections for path in area.get_paths()]
+    if any(path.transformed(axes.transData).intersects_bbox(box, filled=False) for path in drawn):
+        legend.remove()
+        legend_above(axes, names, dashed=dashed, looks=looks)
+
+
+def legend_above(
+    where: Axes | FigureBase,
+    names: Sequence[str],
+    *,
+    dashed: bool,
+    looks: Sequence[int] | None = None,
+    place: Mapping[str, Any] | None = None,
+) -> Legend:
+    """Draw a legend of lines above a figure or a panel.
+
+    ``dashed``, ``looks``: as in `plot_lines`; ``place``: matplotlib's options of another place.
     """
     names = [shortened(name, MOST_LETTERS) for name in names]
-    looks = [LineStyle.of(index) for index in range(len(names))]
     handles = [
         Line2D([], [], color=x.colour, marker=x.marker, linestyle=x.dashes if dashed else "-")
-        for x in looks
+        for x in map(LineStyle.of, range(len(names)) if looks is None else looks)
     ]
-    options: dict[str, Any] = {"loc": "outside upper left"}
+    width, options = where.get_window_extent().width / RESOLUTION * 25.4, place
     if isinstance(where, Axes):  # above the exponent of the axis
-        options = {"loc": "lower left", "bbox_to_anchor": (0.0, 1.0), "borderaxespad": 1.5}
+        above = {"loc": "lower left", "bbox_to_anchor": (0.0, 1.0), "borderaxespad": 1.5}
+        options = place or above
+    else:
+        width, options = width - 20.0, {"loc": "outside upper left"}
     legend = where.legend(handles, ["-"] * len(names), ncols=_columns(names, width), **options)
     for text, name in zip(legend.get_texts(), names, strict=True):
         text.set_text(plain(name))  # matplotlib omits labels that begin with _
@@ -224,10 +297,15 @@ def grid(figure: FigureBase, count: int, columns: int, *, shared: bool = True) -
 
 
 @house_style()
-def save_figure(figure: Figure, stem: Path, *, png: bool = True) -> tuple[Path, ...]:
-    """Write ``stem``.svg and, if ``png``, ``stem``.png; return the files, the SVG last.
+def save_figure(
+    figure: Figure, stem: Path, formats: Collection[str] = ("png", "svg")
+) -> tuple[Path, ...]:
+    """Write ``stem`` as some of png, svg, pdf; return the files in that order.
 
-    Equal figures give equal bytes. Existing files are replaced; InputError: they cannot be.
+    Equal figures give equal bytes. Existing files are replaced.
+
+    Raises:
+        InputError: a file cannot be written, or a format is unknown.
     """
     if not stem.name:
         raise InputError(f"{stem}: is a folder; choose a file name, without suffix")
@@ -239,10 +317,14 @@ def save_figure(figure: Figure, stem: Path, *, png: bool = True) -> tuple[Path, 
             engine.execute(figure)
             figure.set_layout_engine("none")  # avoids a new layout for each file
         files = []
-        metadata = {"png": {"Software": None}, "svg": {"Date": None, "Creator": None}}
-        for format in ("png", "svg") if png else ("svg",):
-            path = stem.with_name(f"{stem.name}.{format}")
+        for format in formats:
+            path, written = stem.with_name(f"{stem.name}.{format}"), io.BytesIO()
+            metadata = NO_DATES[one_of(format, NO_DATES, "format")]
+            figure.savefig(written, format=format, dpi=RESOLUTION, metadata=metadata)
+            content = written.getvalue()
+            if format == "svg":  # paths rounded to 0.01 points have half the size
+                content = PATH.sub(lambda path: DIGITS.sub(rb"\1", path[0]), content)
             with atomic_file(path, replace=True) as file:
-                figure.savefig(file, format=format, dpi=RESOLUTION, metadata=metadata[format])
+                file.write(content)
             files.append(path)
     return tuple(files)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Sequence
 from dataclasses import fields, is_dataclass, replace
 from pathlib import Path
@@ -187,12 +186,8 @@ def render(findings: Findings) -> str:
 
 
 def _image(drawing: Drawing, stem: Path) -> tuple[str, str]:
-    # caption and data URI; paths are rounded to 0.01 points, which halves their size
-    (svg,) = save_figure(drawing.draw(), stem, png=False)
-    text = svg.read_text("utf-8")
-    text = re.sub(r' d="[^"]*"', lambda path: re.sub(r"(\.\d\d)\d+", r"\1", path[0]), text)
-    svg.write_text(text, "utf-8")
-    return drawing.caption, SavedFigure(drawing.caption, svg).data_uri
+    files = save_figure(drawing.draw(), stem, ["svg"])
+    return drawing.caption, SavedFigure(drawing.caption, files).data_uri
 
 
 def record(findings: Findings) -> dict[str, Any]:

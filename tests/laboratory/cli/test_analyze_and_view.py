@@ -217,6 +217,24 @@ def test_pictures_are_pngs_and_renewed(
             assert len(image.getcolors(10**7)) > 50
 
 
+def test_a_paper_has_pdfs_of_its_width_and_the_reports_numbers(
+    analyze: Run, bags: tuple[Path, Path], tmp_path: Path
+) -> None:
+    words = ("--plot", tmp_path, "--width", "single", "--format", "pdf", "--latex")
+    result = analyze(*bags, *words, tmp_path / "results.tex", "--json")
+    assert result.code == 0
+    assert {path.suffix for path in tmp_path.iterdir()} == {".pdf", ".tex"}
+    content = (tmp_path / "control_results.pdf").read_bytes()
+    (points,) = re.findall(rb"/MediaBox \[ 0 0 ([\d.]+)", content)
+    assert float(points) == pytest.approx(88.9 / 25.4 * 72.0, abs=0.01)
+    rows = re.findall(
+        r"^base torque & .*", (tmp_path / "results.tex").read_text("utf-8"), re.MULTILINE
+    )
+    shown = [float(number) for number in re.findall(r"\$([\d.]+)\$", rows[0])]
+    expected = [report["metrics"]["base_torque.rms"] for report in json.loads(result.out)]
+    assert shown == pytest.approx(expected, rel=5e-3)
+
+
 def test_the_shortest_excerpts_have_what_they_can_have(
     analyze: Run, bags: tuple[Path, Path], tmp_path: Path
 ) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import math
 import re
 import threading
 
@@ -12,7 +13,7 @@ from hypothesis import strategies as st
 
 from space_robot.analysis.report import template
 from space_robot.console import progress
-from space_robot.console.tables import Column, Group, JudgedCell, Table, as_markdown
+from space_robot.console.tables import Column, Group, JudgedCell, Table, as_latex, as_markdown
 from space_robot.console.terminal import LONGEST_WORD, print_table, say, terminal
 from space_robot_control.laws import laws
 
@@ -36,6 +37,21 @@ def test_markdown_has_formatted_numbers(table: Table) -> None:
     assert lines[:4] == ["# all", "", "## flights", ""]
     assert lines[4] == "| law | error, rad | verdict |"
     assert lines[6:8] == ["| tde_stc | 1.23e-04 | 1 < 2 holds |", "| <ctc> | - | fails |"]
+
+
+def test_latex_escapes_texts_and_has_powers_of_ten() -> None:
+    columns = Column("a_b", is_label=True), Column("50 %", spec="#.3g")
+    rows = [["x^2 & {y} #1 $ ~ \\ N\u00a0m", value] for value in (5.09e-7, -12.0, 123.0, math.inf)]
+    lines = as_latex(
+        Table("case_1, 5 %", columns, [Group([*rows, ["<", None]], "r_1")])
+    ).splitlines()
+    assert r"\caption{case\_1, 5 \%}" in lines
+    assert lines[3:6] == [r"\begin{tabular}{lr}", r"\toprule", r"a\_b & 50 \% \\"]
+    assert lines[7] == r"\multicolumn{2}{l}{\textit{r\_1}} \\"
+    text = r"x\textasciicircum{}2 \& \{y\} \#1 \$ \textasciitilde{} \textbackslash{} N\,m"
+    numbers = [r"$5.09\times10^{-7}$", "$-12.0$", "$123$", r"$\infty$"]
+    assert lines[8:12] == [rf"{text} & {number} \\" for number in numbers]
+    assert lines[12:14] == [r"$<$ & - \\", r"\bottomrule"]
 
 
 def test_a_page_escapes_and_tells_good_from_bad(table: Table) -> None:
