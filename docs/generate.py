@@ -8,6 +8,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from types import GenericAlias
@@ -115,7 +116,8 @@ def parameters() -> str:
         "# Parameters",
         MADE,
         "Defaults are those of a flight without options: the schema, `config/space_robot.yaml`,"
-        " the mission `paper`, case 1. For how to set them see "
+        " the mission `paper`, case 1. A list `double[]` over axes (base x, y, z, joints), wheels, "
+        "thrusters or torquers may have one value for all. For how to set parameters see "
         "[configuration](../manual/configuration.md).",
         "## All nodes",
         table(HEAD, iter([*_rows(shared, defaults), AUTOSTART])),
@@ -138,6 +140,8 @@ def parameters() -> str:
 
 
 HEAD = ("parameter", "type", "default", "range", "description")
+ONE_EACH = re.compile(r"; one value for all .*")
+"""What is said once, at the top of the page."""
 AUTOSTART = (
     "`autostart`",
     "bool",
@@ -149,7 +153,7 @@ STEP_TICKS = (
     "`step_ticks`",
     "integer",
     "1",
-    f"from 1 to {MOST_TICKS:g}",
+    f"[1, {MOST_TICKS:g}]",
     "ticks per step of a paused plant (service ~/step); can be changed in flight",
 )
 
@@ -162,7 +166,7 @@ def _rows(fields: Mapping[str, Any], defaults: Mapping[str, Any]) -> Iterator[Se
             _ros_type(field.annotation),
             _text(default),
             _range(field),
-            (field.description or "").replace("|", "\\|"),
+            ONE_EACH.sub("", field.description or "").replace("|", "\\|"),
         )
 
 
@@ -185,13 +189,17 @@ def _text(value: Any) -> str:
 
 
 def _range(field: Any) -> str:
-    said = []
-    for item in field.metadata:
-        said += [f"from {item.ge:g}"] if hasattr(item, "ge") else []
-        said += [f"above {item.gt:g}"] if hasattr(item, "gt") else []
-        said += [f"to {item.le:g}"] if hasattr(item, "le") else []
-        said += [f"below {item.lt:g}"] if hasattr(item, "lt") else []
-    return " ".join(said)
+    bounds = {
+        name: getattr(item, name)
+        for item in field.metadata
+        for name in ("ge", "gt", "le", "lt")
+        if hasattr(item, name)
+    }
+    if not bounds:
+        return ""
+    low = f"[{bounds['ge']:g}" if "ge" in bounds else f"({bounds.get('gt', -math.inf):g}"
+    high = f"{bounds['le']:g}]" if "le" in bounds else f"{bounds.get('lt', math.inf):g})"
+    return f"{low}, {high}".replace("e+0", "e").replace("inf", "∞")
 
 
 def _gains() -> Iterator[Sequence[str]]:
