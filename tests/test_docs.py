@@ -185,10 +185,7 @@ OF_GOALS = {topics.JOINT_STATES: ("mission_node",)}
 
 
 def test_security_policy_has_one_publisher_a_topic_and_all_listeners() -> None:
-    text = (ROOT / "docs/manual/security.md").read_text("utf-8")
-    block = re.search(r"```xml\n(.*?)```", text, re.DOTALL)
-    assert block is not None
-    policy = ElementTree.fromstring(block.group(1))
+    policy = ElementTree.parse(ROOT / "config/security/policy.xml")
 
     def nodes(access: str, topic: str) -> list[str]:
         return [
