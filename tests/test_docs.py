@@ -47,7 +47,7 @@ WITHOUT_PICTURE = {
     ),
     "about code, which it shows, or numbers of a few runs": (
         "explanation/gpu explanation/kernels explanation/one_law_three_times "
-        "explanation/same_bits explanation/model_predictive_control"
+        "explanation/same_bits"
     ),
 }
 """Pages by the reason why they have none."""

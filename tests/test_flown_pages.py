@@ -72,7 +72,6 @@ OTHERS = {
     ),
     "words of code": "explanation/kernels",
     "times of a machine": "explanation/lanes measurements/performance",
-    "times of a machine, and flights as slow": "explanation/model_predictive_control",
     "campaigns of many flights": "explanation/real_spacecraft",
     "tests/model/elementary/test_functions.py": "explanation/same_bits",
     "tests/test_shown_outputs.py": "explanation/stability manual/missions",
