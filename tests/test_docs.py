@@ -46,8 +46,7 @@ WITHOUT_PICTURE = {
         "manual/security manual/urdf manual/viewers"
     ),
     "about code, which it shows, or numbers of a few runs": (
-        "explanation/gpu explanation/kernels explanation/one_law_three_times "
-        "explanation/same_bits"
+        "explanation/gpu explanation/kernels explanation/one_law_three_times explanation/same_bits"
     ),
 }
 """Pages by the reason why they have none."""
