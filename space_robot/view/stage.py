@@ -50,7 +50,7 @@ STEEPEST = np.radians(30.0)
 """Largest elevation of the initial camera in orbit."""
 MOST_HIDDEN = 0.25
 """Share of the arms that the base may hide from the initial camera."""
-LARGE = 0.8
+NEAR_LARGEST = 0.8
 """Seen area of a robot from the initial camera, relative to that from the best of `SIDES`."""
 
 
@@ -200,7 +200,7 @@ def clearest_side(
     """
     directions = np.array([camera_direction(side, orbit) for side in SIDES])
     areas = np.sum([_seen_areas(*flight, directions) for flight in flights], axis=0)
-    order = np.argsort(areas < LARGE * areas.max(), kind="stable")
+    order = np.argsort(areas < NEAR_LARGEST * areas.max(), kind="stable")
     shares = []
     for direction in directions[order]:
         shares.append(float(np.mean([_hidden_share(*flight, direction) for flight in flights])))
