@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 DOCS = Path(__file__).parents[1]
-sys.path += [str(DOCS / "flown"), str(DOCS / "pictures")]
+sys.path.append(str(DOCS / "flown"))
 from marks import markdown, put  # noqa: E402
 
 Array = NDArray[np.float64]
@@ -91,6 +91,7 @@ def written(page: str, numbers: dict[str, Any]) -> str:
 
 def draw(drifts: dict[str, Array]) -> None:
     """Draw the drift of angular momentum over time."""
+    sys.path.append(str(DOCS / "pictures"))
     import theme
 
     figure, (axes,) = theme.panels()
