@@ -197,27 +197,32 @@ def league(found: Mapping[str, Any]) -> str:
     laws = sorted({law for each in found.values() for law in each["fronts"]})
     rows = [[f"`{law}`", *(standing(each, law) for each in found.values())] for law in laws]
     rows.append(["joints", *(str(each["joints"]) for each in found.values())])
-    rows.append(
-        ["median error of the chosen law", *(f"{own(each):.2g}" for each in found.values())]
-    )
+    rows.append(["median error where 1 stands", *(f"{own(each):.2g}" for each in found.values())])
     return markdown(["law", *(f"`{name}`" for name in found)], rows)
 
 
+def reference(each: Mapping[str, Any]) -> str:
+    """Return the chosen law, or the best one if the other draws do not confirm the chosen one."""
+    medians = each["medians"]
+    return each["law"] if each["law"] in medians else min(medians, key=medians.__getitem__)
+
+
 def own(each: Mapping[str, Any]) -> float:
-    """Return the chosen law's median in the other draws."""
-    return float(each["medians"].get(each["law"], "nan"))
+    """Return the median of that law in the other draws."""
+    return float(each["medians"][reference(each)])
 
 
 def standing(each: Mapping[str, Any], law: str) -> str:
     """Return how a law stands beside the chosen one."""
+    best = reference(each)
     if law == each["law"]:
-        return "**1**"
+        return "**1**" if law == best else "**out**"
     if law in each["medians"]:
         finding = next((c["finding"] for c in each["compared"] if c["other"] == law), "")
         word = {"better": "", "worse": " better"}.get(finding, " alike")
-        return f"{each['medians'][law] / own(each):.2f}{word}"
+        return f"{each['medians'][law] / own(each):.2f}{word if best == each['law'] else ''}"
     if law in each["order"] and law not in each["out"]:
-        return f"({each['order'][law] / each['order'][each['law']]:.2g})"
+        return f"({each['order'][law] / each['order'][best]:.2g})"
     return "out"
 
 
