@@ -30,7 +30,7 @@ EXECUTABLES = [str(path) for path in files("resource/executables")]
 CONFIG = [
     (f"share/{NAME}/{path.parent}", [str(path)])
     for path in files("config", "**/*.*")
-    if path.suffix == ".yaml" or path.parent.name == "views"
+    if path.suffix in (".yaml", ".xml") or path.parent.name == "views"
 ]
 
 # `space-robot examples` shows and copies them.

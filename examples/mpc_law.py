@@ -11,10 +11,6 @@ prints the RMS errors in 5 s of case 1, with at most 0.7 N m on each axis of the
     ctc:                 attitude 9.6e-03 deg, joints 1-3 2.5e-04 rad
     mpc, equal weights:  attitude 2.5e-03 deg, joints 1-3 6.3e-06 rad
     mpc, attitude first: attitude 8.1e-06 deg, joints 1-3 1.1e-04 rad
-
-Without an active limit the law is computed torque. It is no law of the package: kernels cannot call
-a solver, so it flies neither in lanes nor in C, and one tick in thousands takes longer than 0.5 ms
-(`make bench ARGS=mpc`).
 """
 
 from __future__ import annotations

@@ -169,7 +169,7 @@ def test_against_a_scale_error_a_walk_of_the_bias_helps_and_its_first_variance_d
 
     found = [error(scale), error(scale, rrw=scale * rate / duration**0.5), error(0.0)]
     text = (ROOT / "docs/manual/navigation.md").read_text("utf-8")
-    (paragraph,) = (part for part in text.split("\n\n") if "scale error e is" in part)
+    (paragraph,) = (part for part in text.split("\n\n") if "The scale error e of a gyro" in part)
     shown = [float(number) for number in re.findall(r"by (\d\.\de-5)", paragraph)]
     np.testing.assert_allclose(found, shown, atol=0.06e-5)
     assert error(scale, bias=scale * rate) == pytest.approx(found[0], abs=0.06e-5)
