@@ -27,12 +27,11 @@ from space_robot.choice.criteria import CRITERIA
 from space_robot.choice.law_search import prepare
 from space_robot.choice.recommend import candidates_study
 from space_robot.choice.report import draw_fronts
-from space_robot.console.tables import Column, Group, Table, as_markdown
 from space_robot.processes.executor import cores
 
 sys.path.append(str(Path(__file__).parent / "flown"))
 from flexible_joints import geared
-from marks import put
+from marks import markdown, put
 
 HERE = Path(__file__).parent
 PAGE = HERE / "law_league.md"
@@ -224,12 +223,6 @@ def standing(each: Mapping[str, Any], law: str) -> str:
     if law in each["order"] and law not in each["out"]:
         return f"({each['order'][law] / each['order'][best]:.2g})"
     return "out"
-
-
-def markdown(titles: Sequence[str], rows: Sequence[list[str]]) -> str:
-    """Return a table."""
-    columns = [Column(title, is_label=True) for title in titles]
-    return as_markdown("", [Table("", columns, [Group(rows)])]).strip("# \n")
 
 
 def draw(found: Mapping[str, Any]) -> None:

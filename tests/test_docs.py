@@ -13,16 +13,15 @@ from xml.etree import ElementTree
 import click
 import pytest
 import yaml
+from paths import DOCS, ROOT
 
 from space_robot.cli.main import cli
 from space_robot.flight.graph.node_names import LISTENERS
 from space_robot_msgs_py import topics
 
-ROOT = Path(__file__).resolve().parents[1]
-DOCS = ROOT / "docs"
 DOCUMENTS = [
     *(ROOT / "README.md", ROOT / "CONTRIBUTING.md"),
-    *sorted((ROOT / "docs").rglob("*.md")),
+    *sorted(DOCS.rglob("*.md")),
     *sorted((ROOT / "space_robot/help").glob("*.md")),
 ]
 PREFIXES = (

@@ -19,10 +19,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-DOCS = Path(__file__).parents[1]
-sys.path.append(str(DOCS / "flown"))
-from marks import markdown, put  # noqa: E402
+sys.path.append(str(Path(__file__).parents[1] / "flown"))
+from marks import markdown, put
 
+DOCS = Path(__file__).parents[1]
 Array = NDArray[np.float64]
 PAGE, NUMBERS, PICTURE = (DOCS / f"validation.{kind}" for kind in ("md", "json", "svg"))
 PACKAGES = "space_robot", "numpy", "numba"
@@ -46,12 +46,10 @@ def measure() -> tuple[list[dict[str, Any]], dict[str, Array]]:
         drift = float(drifts[OURS][:, 1:].max())
         yield ValidationRow("momenta and energy of a free robot", PINOCCHIO, extent, drift, 1e-9)
 
-    rows = []
-    sections = physics.trees, conserved, physics.joints, physics.captures, physics.in_orbit
-    for section in (*sections, software.navigation, software.allocation, software.statistics):
-        rows += [announced(row) for row in section()]
-    rows += [announced(row) for row in software.bits()]
-    return rows, drifts
+    of_physics = physics.trees, conserved, physics.joints, physics.captures, physics.in_orbit
+    of_software = software.navigation, software.allocation, software.statistics, software.bits
+    sections = *of_physics, *of_software
+    return [announced(row) for section in sections for row in section()], drifts
 
 
 def announced(row: Any) -> dict[str, Any]:

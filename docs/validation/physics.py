@@ -159,10 +159,7 @@ def joints() -> Iterator[ValidationRow]:
         robot = strategies.with_gears(robot, gears)
         spinning = rotors.random_motor_rotors(rng, robot)
         plant, equations = plant_of(robot, substeps=4), rotors.RotorEquations(robot, spinning)
-        torque, start = (
-            np.concatenate([np.zeros(3), rng.uniform(-9.0, 9.0, robot.n)]),
-            plant_numbers(plant),
-        )
+        torque = np.concatenate([np.zeros(3), rng.uniform(-9.0, 9.0, robot.n)])
         force = np.concatenate([np.zeros(3), torque, torque[3:][equations.joints]])
         force[6:][equations.joints] = 0.0
         start = plant_numbers(plant)

@@ -128,9 +128,8 @@ def _friction(description: Mapping[str, Any]) -> str:
     if not description.get("friction", True):
         return ", without friction"
     case = description.get("scenario", {}).get("case")
-    return (
-        ", friction" if isinstance(case, Mapping) and any(case.get("friction", {}).values()) else ""
-    )
+    is_rough = isinstance(case, Mapping) and any(case.get("friction", {}).values())
+    return ", friction" if is_rough else ""
 
 
 def shown_names(reports: Sequence[Report]) -> list[str]:

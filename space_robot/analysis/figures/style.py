@@ -232,12 +232,11 @@ def legend_inside(
 ) -> None:
     """Draw a legend of lines in the emptiest part of a panel; above it if it would cover a line."""
     place = {"loc": "best", "borderaxespad": 0.8, "frameon": True, "edgecolor": "none"}
-    legend = legend_above(axes, names, dashed=dashed, looks=looks, place=place)
+    legend = _legend_of(axes, names, dashed, looks, place)
     assert isinstance(axes.figure, Figure)
     axes.figure.draw_without_rendering()
     box = legend.get_window_extent().padded(2.0)
-    lines = [line for line in axes.get_lines() if line.get_transform() is axes.transData]
-    drawn = [line.get_path() for line in lines]
+    drawn = [x.get_path() for x in axes.get_lines() if x.get_transform() is axes.transData]
     drawn += [path for area in axes.collections for path in area.get_paths()]
     if any(path.transformed(axes.transData).intersects_bbox(box, filled=False) for path in drawn):
         legend.remove()
@@ -250,24 +249,28 @@ def legend_above(
     *,
     dashed: bool,
     looks: Sequence[int] | None = None,
-    place: Mapping[str, Any] | None = None,
 ) -> Legend:
-    """Draw a legend of lines above a figure or a panel.
+    """Draw a legend of lines, which look as in `plot_lines`, above a figure or a panel."""
+    above_exponent = {"loc": "lower left", "bbox_to_anchor": (0.0, 1.0), "borderaxespad": 1.5}
+    place = above_exponent if isinstance(where, Axes) else {"loc": "outside upper left"}
+    return _legend_of(where, names, dashed, looks, place)
 
-    ``dashed``, ``looks``: as in `plot_lines`; ``place``: matplotlib's options of another place.
-    """
+
+def _legend_of(
+    where: Axes | FigureBase,
+    names: Sequence[str],
+    dashed: bool,
+    looks: Sequence[int] | None,
+    place: Mapping[str, Any],
+) -> Legend:
     names = [shortened(name, MOST_LETTERS) for name in names]
     handles = [
         Line2D([], [], color=x.colour, marker=x.marker, linestyle=x.dashes if dashed else "-")
         for x in map(LineStyle.of, range(len(names)) if looks is None else looks)
     ]
-    width, options = where.get_window_extent().width / RESOLUTION * 25.4, place
-    if isinstance(where, Axes):  # above the exponent of the axis
-        above = {"loc": "lower left", "bbox_to_anchor": (0.0, 1.0), "borderaxespad": 1.5}
-        options = place or above
-    else:
-        width, options = width - 20.0, {"loc": "outside upper left"}
-    legend = where.legend(handles, ["-"] * len(names), ncols=_columns(names, width), **options)
+    margin = 0.0 if isinstance(where, Axes) else 20.0
+    width = where.get_window_extent().width / RESOLUTION * 25.4 - margin
+    legend = where.legend(handles, ["-"] * len(names), ncols=_columns(names, width), **place)
     for text, name in zip(legend.get_texts(), names, strict=True):
         text.set_text(plain(name))  # matplotlib omits labels that begin with _
     return legend
