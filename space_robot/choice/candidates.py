@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import NamedTuple
@@ -30,6 +30,8 @@ MOST_SATURATION = 0.05
 """Largest median share of ticks with a wheel at its limit."""
 GROUP = 8
 """Flights that a process takes at a time."""
+CONFIRMING = 3
+"""So many times the draws does the first law fly further ones: few miss a rare limit cycle."""
 
 
 class Candidate(NamedTuple):
@@ -137,6 +139,42 @@ def ranked(flown: Sequence[FlownCandidate], criterion: Criterion) -> list[FlownC
     least = min(each.median(criterion.error) for each in able)
     near = [each for each in able if each.median(criterion.error) <= criterion.near * least]
     return sorted(near, key=lambda each: each.median(criterion.value))
+
+
+def select(
+    waiting: Mapping[str, Iterator[Candidate]],
+    fly: Callable[[Sequence[Candidate], int, int], Sequence[FlownCandidate]],
+    criterion: Criterion,
+    runs: int,
+    seed: int,
+) -> tuple[dict[str, FlownCandidate], list[FlownCandidate]]:
+    """Fly candidates of all laws, with the next gains of a law while it is out, and rank them.
+
+    The first of them must not be out in further draws either.
+
+    Args:
+        waiting: candidates of each law, the preferred one first.
+        fly: flies candidates with a number of draws from a seed.
+        criterion: of the ranks.
+        runs: draws.
+        seed: of the draws.
+
+    Returns:
+        What was flown last of each law, and those that are not out, the best one first.
+    """
+    by_law: dict[str, FlownCandidate] = {}
+    due = list(waiting)
+    while True:
+        if candidates := [each for law in due if (each := next(waiting[law], None))]:
+            by_law |= {each.law: each for each in fly(candidates, runs, seed)}
+        if due := [each.law for each in candidates if by_law[each.law].reason]:
+            continue
+        if not (order := ranked(list(by_law.values()), criterion)):
+            return by_law, []
+        (first,) = fly([order[0].candidate], CONFIRMING * runs, seed + 1)
+        if not first.reason:
+            return by_law, order
+        by_law[first.law], due = first, [first.law]
 
 
 def comparisons(order: Sequence[FlownCandidate], criterion: Criterion) -> list[PairedComparison]:

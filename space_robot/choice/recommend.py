@@ -18,7 +18,7 @@ from ..console.progress import counting_progress
 from ..flight.plan import Flight
 from ..processes.scratch_folder import ScratchFolder
 from ..tuning.method import Tuned
-from .candidates import Candidate, FlownCandidate, comparisons, fly_candidates, ranked
+from .candidates import Candidate, FlownCandidate, comparisons, fly_candidates, select
 from .criteria import CRITERIA
 from .front import Front
 from .gain_files import install, write_gains
@@ -30,8 +30,6 @@ FAR, FEWEST = 10.0, 4
 few."""
 QUIETER = (1.0, 0.5, 0.25)
 """Shares of the ripple allowed at which a law flies the draws, until it is not out."""
-CONFIRMING = 3
-"""So many times the draws does the first law fly further ones: few miss a rare limit cycle."""
 
 
 @dataclass(frozen=True)
@@ -152,8 +150,6 @@ def recommend(
     criterion = CRITERIA[options.criterion]
 
     def fly(candidates: Sequence[Candidate], runs: int, seed: int) -> list[FlownCandidate]:
-        if not candidates:
-            return []
         with counting_progress("flights of the candidates") as begin:
             how = options.criterion, runs, seed, options.workers, begin
             return fly_candidates(study, candidates, *how)
@@ -165,18 +161,7 @@ def recommend(
             next(own, None)  # its gain files are written
         else:
             waiting[front.law] = own
-    by_law: dict[str, FlownCandidate] = {}
-    order: list[FlownCandidate] = []
-    due = list(waiting)
-    while due:
-        candidates = [each for law in due if (each := next(waiting[law], None))]
-        by_law |= {each.law: each for each in fly(candidates, options.runs, options.seed)}
-        due = [each.law for each in candidates if by_law[each.law].reason]
-        order = ranked(list(by_law.values()), criterion)
-        if not due and order:
-            (first,) = fly([order[0].candidate], CONFIRMING * options.runs, options.seed + 1)
-            if first.reason:
-                by_law[first.law], due = first, [first.law]
+    by_law, order = select(waiting, fly, criterion, options.runs, options.seed)
     flown = list(by_law.values())
     out |= {each.law: each.reason for each in flown if each.reason}
     compared = comparisons(order, criterion) if order else []

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +14,7 @@ from click.testing import CliRunner, Result
 from hypothesis import given
 from hypothesis import strategies as st
 
+from space_robot.choice.candidates import Candidate, FlownCandidate, select
 from space_robot.choice.criteria import CRITERIA
 from space_robot.choice.front import Front, Tried
 from space_robot.choice.law_search import has_estimate
@@ -165,6 +167,38 @@ def test_attitude_counts_as_much_as_all_joints() -> None:
     metrics = {"attitude_angle.rms": 4.0, "joints_1_3.rms": 1.0, "joints_4_6.rms": 16.0}
     error = CRITERIA["tracking"].error({**metrics, "base_torque.rms": 9.0})
     assert error == pytest.approx(4.0)
+
+
+def test_the_first_law_must_pass_further_draws_with_these_gains_or_quieter_ones() -> None:
+    # error, and run from which on flights end early, with the gain sets of each law
+    sets = {"pd": [(1.0, 15), (4.0, 99)], "ctc": [(2.0, 99)], "indi": [(0.5, 2), (0.6, 3)]}
+    score = Score(1.0, 1.0, 0.0, 1.0, False, {})
+    flown: list[tuple[list[str], int, int]] = []
+
+    def candidate(law: str, number: int) -> Candidate:
+        return Candidate(law, law, GainPoint({}, 0.0), score, f"{law}{number}")
+
+    def fly(candidates: Sequence[Candidate], runs: int, seed: int) -> list[FlownCandidate]:
+        flown.append(([each.folder for each in candidates], runs, seed))
+        found = []
+        for each in candidates:
+            error, first_early = sets[each.law][int(each.folder[-1])]
+            good, bad = min(runs, first_early), max(0, runs - first_early)
+            flights: list[dict[str, float]] = [{"attitude_angle.rms": error}] * good
+            found.append(FlownCandidate(each, [*flights, *[{}] * bad]))
+        return found
+
+    waiting = {law: iter([candidate(law, k) for k in range(len(own))]) for law, own in sets.items()}
+    by_law, order = select(waiting, fly, CRITERIA["tracking"], 6, 1)
+    assert [each.candidate.folder for each in order] == ["ctc0", "pd1"]
+    assert by_law["indi"].reason == "diverged in 3 of 6 flights"
+    assert flown == [
+        (["pd0", "ctc0", "indi0"], 6, 1),
+        (["indi1"], 6, 1),
+        (["pd0"], 18, 2),  # the first one is out in further draws
+        (["pd1"], 6, 1),
+        (["ctc0"], 18, 2),
+    ]
 
 
 @pytest.mark.parametrize("asked", [("--ripple", "10"), ("--error", "1"), ("--bandwidth", "4")])
