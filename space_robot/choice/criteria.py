@@ -31,7 +31,7 @@ class Criterion(NamedTuple):
     def of(self, log: FlightLog) -> dict[str, float]:
         """Return the metrics of a complete flight that scores, reasons and this one need."""
         flight, patterns = AnalysedLog(log), (*METRICS, *self.errors, *self.metrics)
-        known = [n for n in names(flight) if any(fnmatchcase(n, p) for p in patterns)]
+        known = [n for n in names(flight, GROUPS) if any(fnmatchcase(n, p) for p in patterns)]
         return evaluate(flight, known)[0]
 
     def log_errors(self, metrics: Metrics) -> dict[str, float]:
@@ -84,3 +84,8 @@ METRICS = (
     *("wheels.saturation", "*.standing", "*.beyond_effort"),
 )
 """Patterns of the metrics that scores and reasons need."""
+GROUPS = (
+    *("errors", "end_effector", "torques", "roughness", "ripple", "wheel_saturation"),
+    *("standing", "beyond_limits"),
+)
+"""Groups of all these metrics."""

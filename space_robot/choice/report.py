@@ -62,7 +62,7 @@ def candidates_table(choice: Recommendation, notes: Sequence[str] = ()) -> Table
 
 
 def report(choice: Recommendation) -> dict[str, Any]:
-    """Return a choice as data for JSON."""
+    """Return a choice as data for `json_text`."""
     options = choice.options
     return {
         "law": choice.law,
@@ -79,7 +79,7 @@ def report(choice: Recommendation) -> dict[str, Any]:
                 "gains": {k: v.tolist() for k, v in each.candidate.gains.gains.items()},
                 "acceleration_filter_hz": each.candidate.gains.corner_hz,
                 "trials": dict(each.candidate.score.metrics),
-                "value": _finite(each.median(CRITERIA[options.criterion].value)),
+                "value": each.median(CRITERIA[options.criterion].value),
             }
             for each in choice.flown
         },
@@ -87,7 +87,7 @@ def report(choice: Recommendation) -> dict[str, Any]:
             {
                 "law": c.other,
                 "finding": c.finding,
-                "ratio": _finite(c.ratio.value),
+                "ratio": c.ratio.value,
                 "p": c.p_better,
                 "better": c.better,
                 "worse": c.worse,
@@ -176,7 +176,3 @@ def write_report(choice: Recommendation, folder: Path, command: str) -> Path:
     if choice.order:
         write_text(campaign_text(choice, folder, command), folder / CAMPAIGN, replace=True)
     return folder / "index.html"
-
-
-def _finite(value: float) -> float | None:
-    return value if math.isfinite(value) else None

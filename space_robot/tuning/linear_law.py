@@ -99,21 +99,16 @@ def assumed_inertia(law: ControlLaw, posture: Posture, scale: float = 1.0) -> Ar
 def linear_laws(
     law: ControlLaw, postures: Sequence[Posture], inertia_scale: float = 1.0
 ) -> list[LinearLaw]:
-    """Return the `linear_law` in each posture."""
-    if depends_on_posture(law, postures):
-        return [linear_law(law, posture, inertia_scale) for posture in postures]
-    return [linear_law(law, postures[0], inertia_scale)] * len(postures)
+    """Return the `linear_law` in each posture.
 
-
-def depends_on_posture(law: ControlLaw, postures: Sequence[Posture]) -> bool:
-    """Return True if a law may be another one in each posture.
-
-    One that needs no nominal inertia is, if it differs in the first and the last posture.
+    One without nominal inertia is computed in the first and the last; if equal, it is in all.
     """
-    if law.needs_model:
-        return True
-    first, last = (linear_law(law, postures[index]).force_by for index in (0, -1))
-    return not all(np.allclose(first[name], last[name], rtol=1e-5) for name in INPUTS)
+    first, last = (linear_law(law, postures[index], inertia_scale) for index in (0, -1))
+    pairs = [(first.force_by[name], last.force_by[name]) for name in INPUTS]
+    if not law.needs_model and all(np.allclose(*pair, rtol=1e-5) for pair in pairs):
+        return [first] * len(postures)
+    inner = [linear_law(law, posture, inertia_scale) for posture in postures[1:-1]]
+    return [first, *inner, last][: len(postures)]
 
 
 def _influential(step: Array, by_input: Array, force_by_state: Array) -> Sequence[int]:
