@@ -121,7 +121,7 @@ def wheel_saturation(flight: AnalysedLog) -> dict[str, float]:
         motion = np.stack(wheel_motion(log, start, stop, wheels), axis=1)
         return np.abs(motion) >= limits * (1.0 - ROUNDING)
 
-    at_limit: NDArray[np.bool_] = np.concatenate(flight.each_block(compare))
+    at_limit: NDArray[np.bool_] = np.concatenate([compare(*rows) for rows in flight.blocks()])
     at_either: NDArray[np.bool_] = np.logical_or.reduce(at_limit, axis=1)
     ticks = np.count_nonzero(at_limit, axis=0)
     any_ticks = float(np.count_nonzero(at_either.any(axis=1)))

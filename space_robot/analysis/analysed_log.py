@@ -185,10 +185,6 @@ class AnalysedLog:
         """Return first row and stop of each block, small enough for temporary arrays."""
         return block_bounds(self.log.ticks)
 
-    def each_block(self, function: Callable[[int, int], Any]) -> list[Any]:
-        """Return what a function makes of the rows of each block, from start to before stop."""
-        return [function(start, stop) for start, stop in self.blocks()]
-
     def sum_up(self, function: Callable[[int, int], Any]) -> Array:
         """Return the sum of what a function makes of the rows of each block."""
         total: Array = np.sum([function(*block) for block in self.blocks()], axis=0)

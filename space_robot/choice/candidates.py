@@ -148,9 +148,9 @@ def select(
     runs: int,
     seed: int,
 ) -> tuple[dict[str, FlownCandidate], list[FlownCandidate]]:
-    """Fly candidates of all laws, with the next gains of a law while it is out, and rank them.
+    """Fly candidates of all laws, with the next gains of a law while it is out.
 
-    The first of them must not be out in further draws either.
+    The first of those that are not out must not be so in further draws either.
 
     Args:
         waiting: candidates of each law, the preferred one first.

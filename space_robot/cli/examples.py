@@ -51,7 +51,8 @@ def copy(folder: Path) -> None:
     share = _share()
     check_free(folder / "examples")
     check_free(folder / "config")
-    files = [*example_files(share), *config_files(share)]
+    config = sorted(file for file in (share / "config").rglob("*.*") if file.is_file())
+    files = [*example_files(share), *config]
     for file in files:
         target = folder / file.relative_to(share)
         target.parent.mkdir(parents=True, exist_ok=True)
@@ -82,11 +83,6 @@ def example_files(share: Path) -> Iterator[Path]:
         for file in sorted((share / folder).iterdir()):
             if file.suffix in SUFFIXES or file.name == "Makefile":
                 yield file
-
-
-def config_files(share: Path) -> Iterator[Path]:
-    """Yield the files of the shipped configuration in ``share``."""
-    yield from sorted(file for file in (share / "config").rglob("*.*") if file.is_file())
 
 
 def _topic(file: Path) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,14 +38,10 @@ def grid_points(table: DataFrame, grid: Sequence[str]) -> list[GridPoint]:
     points = []
     names = [name.removeprefix("scenario.") for name in grid]
     for key, rows in table.groupby([f"vary.{n}" for n in grid], sort=False, dropna=False):
-        values = tuple(_word(value) for value in key)
+        values = tuple(f"{v:g}" if isinstance(v, float) else str(v) for v in key)
         point = ", ".join(f"{name} = {v}" for name, v in zip(names, values, strict=True))
         points.append(GridPoint(values, point, rows))
     return points
-
-
-def _word(value: Any) -> str:
-    return f"{value:g}" if isinstance(value, float) else str(value)
 
 
 def laws_in(table: DataFrame) -> list[str]:

@@ -224,7 +224,9 @@ class _Follower:
         events = []
         simulated_s, leader = self._monitor.simulated_s, self._graph.leader
         for name, node in list(self._graph.nodes.items()):
-            hangs = name == "controller" and self._options.restart_controller and self._hangs(name)
+            silence = self._monitor.silence.get(f"{name}_node", 0)
+            may_restart = name == "controller" and self._options.restart_controller
+            hangs = may_restart and silence >= HUNG_REPORTS
             if (node.exit_code is None and not hangs) or name in self._gone:
                 continue
             if node is leader:
@@ -240,9 +242,6 @@ class _Follower:
                 if name == "recorder" or name not in self._planned:
                     self._failures.append(f"{ended} at {simulated_s:.2f} s")
         return events
-
-    def _hangs(self, name: str) -> bool:
-        return self._monitor.silence.get(f"{name}_node", 0) >= HUNG_REPORTS
 
     def _lose_leader(self, leader: NodeProcess) -> None:
         self._monitor.poll()

@@ -70,8 +70,9 @@ class ControllerChoice:
         named = controller or str(recorded.get("controller") or flown_name)
         _check_law(named)
         if not trust:
-            swaps = () if "swaps" in chosen else map(_swap_law, scenario.swaps)
-            for name in (*swaps, *(() if controller else (named,))):
+            swaps = () if "swaps" in chosen else scenario.swaps
+            swapped = (text.partition(":")[2].strip() for text in swaps)
+            for name in (*swapped, *(() if controller else (named,))):
                 require_shipped_law(name)
         law = find_law(named)
         is_same_law = law.name == (flown_name or law.name)
@@ -164,7 +165,3 @@ def _parameters(recorded: Tree, chosen: Tree) -> Tree:
         options.add("navigation_filter")
     kept = ControllerNodeSettings.model_fields.keys() - options
     return {k: v for k, v in recorded.items() if k.partition(".")[0] in kept} | chosen
-
-
-def _swap_law(text: str) -> str:
-    return text.partition(":")[2].strip()
