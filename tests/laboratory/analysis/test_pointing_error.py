@@ -242,6 +242,16 @@ def test_a_displaced_and_turned_base_displaces_and_turns_the_tool(seed: int, n: 
     np.testing.assert_allclose(path.errors(0, TICKS)[:, 1], angle, rtol=1e-9)
 
 
+def moving(start: list[float], *segments: dict[str, Any], **options: Any) -> sr.Scenario:
+    mission = {"start": {"joints_deg": start}, "segments": [*segments]}
+    return sr.Scenario(mission=mission, controller="ctc", friction=False, case="1", **options)
+
+
+def turned(over: float, *segments: dict[str, Any], **options: Any) -> sr.Scenario:
+    turn = {"joints_deg": [5, 120, 220, 0, -10, 0], "duration": over}
+    return moving([0, 120, 220, 0, -10, 0], turn, *segments, **options)
+
+
 @pytest.mark.parametrize("frame", ["inertial", "base"])
 def test_a_panel_on_one_side_does_not_displace_the_tool(frame: str) -> None:
     """A locked panel moves the base's centre of mass, not the frame that goals are given in."""
@@ -249,16 +259,9 @@ def test_a_panel_on_one_side_does_not_displace_the_tool(frame: str) -> None:
     panels = yaml.safe_load((CONFIG / "robots/flexible_panels.yaml").read_text())
     links = panels["robot"]["links"]
     panels["robot"]["links"] = [x for x in links if not x["name"].startswith("right")]
-    segments = [{"tool": {"xyz": goal, "frame": frame}, "duration": 3}]
-    flown = sr.Scenario(
-        robot=panels,
-        mission={"start": {"joints_deg": [10, -60, 120]}, "segments": segments},
-        controller="ctc",
-        gains=str(CONFIG / "gains/flexible_panels/tuned/ctc.yaml"),
-        friction=False,
-        case="1",
-        duration=4,
-    ).fly()
+    segment = {"tool": {"xyz": goal, "frame": frame}, "duration": 3}
+    gains = str(CONFIG / "gains/flexible_panels/tuned/ctc.yaml")
+    flown = moving([10, -60, 120], segment, robot=panels, gains=gains, duration=4).fly()
     log = flown.log
     _, place = tool_pose(flown.flight.robot, log.quaternion[-1:], log.all_positions[-1:])
     if frame == "inertial":
@@ -269,30 +272,14 @@ def test_a_panel_on_one_side_does_not_displace_the_tool(frame: str) -> None:
 
 def test_in_orbit_the_path_is_that_of_the_free_centre_of_mass() -> None:
     """Drag moves the robot from the origin in free fall, and the tool not from its path."""
-    segments = [{"joints_deg": [5, 120, 220, 0, -10, 0], "duration": 5}, {"hold": 15}]
-    flown = sr.Scenario(
-        mission={"start": {"joints_deg": [0, 120, 220, 0, -10, 0]}, "segments": segments},
-        controller="ctc",
-        friction=False,
-        case="1",
-        orbit="iss",
-        parameters={"plant": {"atmosphere.density": 1e-8}},
-    ).fly()
+    thick = {"plant": {"atmosphere.density": 1e-8}}
+    flown = turned(5, {"hold": 15}, orbit="iss", parameters=thick).fly()
     assert flown.metrics["path_drift.max"] > 1e-2
     assert flown.metrics["tool.max"] < 1e-5
 
 
 def test_a_capture_moves_the_path_only_from_then_on() -> None:
-    segments = [{"joints_deg": [5, 120, 220, 0, -10, 0], "duration": 1}]
-    scenario = sr.Scenario(
-        mission={"start": {"joints_deg": [0, 120, 220, 0, -10, 0]}, "segments": segments},
-        controller="ctc",
-        friction=False,
-        case="1",
-        duration=2,
-        events=["capture@1:tumbling_satellite"],
-    )
-    log = scenario.fly().log
+    log = turned(1, duration=2, events=["capture@1:tumbling_satellite"]).fly().log
     path = ToolPath(log)
     parts = [path.wanted(*part)[2] for part in [(0, 1200), (1200, 2000), (2000, 4000)]]
     drift = np.concatenate(parts)
@@ -303,9 +290,8 @@ def test_a_capture_moves_the_path_only_from_then_on() -> None:
 
 
 def test_a_line_is_flown_within_a_micrometre_and_a_payload_moves_it() -> None:
-    start, goal = [0, 90, 200, 20, 30, 10], {"xyz": [0.3, 0.0, -0.4], "rpy_deg": [0, 0, 0]}
-    mission = {"start": {"joints_deg": start}, "segments": [{"tool": goal, "duration": 2}]}
-    scenario = sr.Scenario(controller="ctc", mission=mission, friction=False, case="1")
+    goal = {"xyz": [0.3, 0.0, -0.4], "rpy_deg": [0, 0, 0]}
+    scenario = moving([0, 90, 200, 20, 30, 10], {"tool": goal, "duration": 2})
     found = scenario.fly().metrics
     assert found["tool.rms"] <= found["tool.max"] < 1e-6
     assert found["tool_rotation.rms"] <= found["tool_rotation.max"] < np.radians(1e-5)

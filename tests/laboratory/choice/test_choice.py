@@ -170,25 +170,24 @@ def test_attitude_counts_as_much_as_all_joints() -> None:
 
 
 def test_the_first_law_must_pass_further_draws_with_these_gains_or_quieter_ones() -> None:
-    # error, and run from which on flights end early, with the gain sets of each law
-    sets = {"pd": [(1.0, 15), (4.0, 99)], "ctc": [(2.0, 99)], "indi": [(0.5, 2), (0.6, 3)]}
-    score = Score(1.0, 1.0, 0.0, 1.0, False, {})
+    # error of each gain set, and run from which on its flights end early
+    sets = {"pd0": (1, 15), "pd1": (4, 99), "ctc0": (2, 99), "indi0": (0.5, 2), "indi1": (0.6, 3)}
+    about = GainPoint({}, 0.0), Score(1.0, 1.0, 0.0, 1.0, False, {})
     flown: list[tuple[list[str], int, int]] = []
-
-    def candidate(law: str, number: int) -> Candidate:
-        return Candidate(law, law, GainPoint({}, 0.0), score, f"{law}{number}")
 
     def fly(candidates: Sequence[Candidate], runs: int, seed: int) -> list[FlownCandidate]:
         flown.append(([each.folder for each in candidates], runs, seed))
         found = []
         for each in candidates:
-            error, first_early = sets[each.law][int(each.folder[-1])]
-            good, bad = min(runs, first_early), max(0, runs - first_early)
-            flights: list[dict[str, float]] = [{"attitude_angle.rms": error}] * good
-            found.append(FlownCandidate(each, [*flights, *[{}] * bad]))
+            error, end = sets[each.folder]
+            rows = [{"attitude_angle.rms": error} if run < end else {} for run in range(runs)]
+            found.append(FlownCandidate(each, rows))
         return found
 
-    waiting = {law: iter([candidate(law, k) for k in range(len(own))]) for law, own in sets.items()}
+    waiting = {
+        law: iter([Candidate(law, law, *about, name) for name in sets if name[:-1] == law])
+        for law in ("pd", "ctc", "indi")
+    }
     by_law, order = select(waiting, fly, CRITERIA["tracking"], 6, 1)
     assert [each.candidate.folder for each in order] == ["ctc0", "pd1"]
     assert by_law["indi"].reason == "diverged in 3 of 6 flights"

@@ -23,6 +23,7 @@ from space_robot.flight.simulate import simulate
 from space_robot_control.controller.settings import ControllerNodeSettings
 from space_robot_control.laws import laws
 from space_robot_model.robot import Robot
+from space_robot_model.robot.find import robot_names
 from space_robot_msgs_py.errors import InputError, SpaceRobotError
 
 
@@ -210,6 +211,7 @@ def files(folder: Path) -> dict[str, list[str]]:
         ("paper", "nominal"),
         pytest.param("seven_joint", "robust", marks=pytest.mark.docs),
         pytest.param("ets_vii", "robust", marks=pytest.mark.docs),
+        *((robot, "tuned") for robot in robot_names() if robot not in ("paper", "seven_joint")),
     ],
 )
 def test_the_command_in_the_files_makes_them(robot: str, gains: str, tmp_path: Path) -> None:
