@@ -36,11 +36,10 @@ from marks import markdown, put
 HERE = Path(__file__).parent
 PAGE = HERE / "law_league.md"
 OTHER_SEED, DRAWS = 1000, 200
-EVALUATIONS, RUNS = 80, 12
+MANY = 160
+"""Gain sets of each law in the settings, whose fronts are compared."""
 MOST = 3
 """Laws that fly the other draws."""
-FEW = 48
-"""Gain sets of each law for the satellites, and where only its front is searched."""
 FIRST_S = 40.0
 """Of the satellites' missions, which last two minutes."""
 COMMAND = "docs/law_league.py"
@@ -124,10 +123,9 @@ def scenario_of(name: str, folder: Path) -> dict[str, Any]:
 def evidence(name: str, folder: Path, seed: int) -> dict[str, Any]:
     """Choose, fly the other draws, and return what came of both."""
     scenario = scenario_of(name, folder)
-    tries = EVALUATIONS if name in SHIPPED else FEW
-    options = ChoiceOptions(evaluations=tries, runs=RUNS, seed=seed, workers=cores())
+    options = ChoiceOptions(seed=seed, workers=cores())
     begun = time.monotonic()
-    choice, _ = recommend(scenario, folder / f"{name}.{seed}", options, COMMAND)
+    choice = recommend(scenario, folder / f"{name}.{seed}", options, COMMAND)
     seconds = time.monotonic() - begun
     criterion = CRITERIA[options.criterion]
     nominal = Scenario(**scenario).check()
@@ -158,7 +156,7 @@ def evidence(name: str, folder: Path, seed: int) -> dict[str, Any]:
 def searched(name: str, seed: int) -> dict[str, Any]:
     """Return the fronts of all laws for one of the settings."""
     title, options, uncertainty = SETTINGS[name]
-    how = ChoiceOptions(evaluations=FEW, seed=seed, workers=cores(), uncertainty=uncertainty)
+    how = ChoiceOptions(evaluations=MANY, seed=seed, workers=cores(), uncertainty=uncertainty)
     with TemporaryDirectory() as folder:
         search, _, _ = prepare({**PAPER, **options}, Path(folder), how, COMMAND)
         fronts = search.fronts()

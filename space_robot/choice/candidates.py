@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import NamedTuple
 
@@ -15,7 +15,7 @@ from ..analysis.words import Metrics, limit_cycles, with_statistic
 from ..campaign.row.fly import RowFlyer
 from ..campaign.row.row import Task
 from ..campaign.study import Study
-from ..campaign.verdicts.laws import PairedComparison, compare
+from ..campaign.verdicts.laws import PairedComparison, compare, holm
 from ..flight.batch import fly_in_lanes
 from ..processes.executor import run_all
 from .criteria import CRITERIA, Criterion, is_error
@@ -25,7 +25,7 @@ from .trials import HELD, Score
 Array = NDArray[np.float64]
 
 OFTEN = 0.1
-"""Share of the flights with a limit cycle, or ended early, from which on a law is out."""
+"""A law is out if a larger share of its flights has a limit cycle, or a joint beyond its effort."""
 MOST_SATURATION = 0.05
 """Largest median share of ticks with a wheel at its limit."""
 GROUP = 8
@@ -82,14 +82,15 @@ class FlownCandidate:
     def reason(self) -> str:
         """Why the candidate is out, in a few words; empty if it is not."""
         count = len(self.flights)
-        if (ended := sum(not flight for flight in self.flights)) > OFTEN * count:
+        if ended := sum(not flight for flight in self.flights):
             return f"diverged in {ended} of {count} flights"
-        flown = [flight for flight in self.flights if flight]
+        flown = self.flights
         cycles = [text for flight in flown for text in limit_cycles(flight)]
         if len(cycles) > OFTEN * count:
             return f"{cycles[0]} (in {len(cycles)} of {count} flights)"
-        if any(any(with_statistic(flight, "beyond_effort").values()) for flight in flown):
-            return "joints beyond their limits of effort"
+        beyond = sum(any(with_statistic(flight, "beyond_effort").values()) for flight in flown)
+        if beyond > OFTEN * count:
+            return f"joints beyond their limits of effort in {beyond} of {count} flights"
         share = float(np.median([flight.get("wheels.saturation", 0.0) for flight in flown]))
         if share > MOST_SATURATION:
             return f"wheels at their limit in {share:.0%} of the ticks"
@@ -178,13 +179,15 @@ def select(
 
 
 def comparisons(order: Sequence[FlownCandidate], criterion: Criterion) -> list[PairedComparison]:
-    """Compare the first candidate with each of the others over the same draws."""
+    """Compare the first candidate with each of the others over the same draws, by Holm's method."""
     first, *others = order
     own = first.values(criterion.value)
-    return [
+    found = [
         compare(own, other.values(criterion.value), law=first.law, other=other.law)
         for other in others
     ]
+    p_values = holm([each.p_better for each in found])
+    return [replace(c, p_better=p) for c, p in zip(found, p_values, strict=True)]
 
 
 def _fly(flyer: RowFlyer, criterion: str, tasks: Sequence[Task]) -> list[dict[str, float]]:

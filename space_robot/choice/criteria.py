@@ -9,6 +9,7 @@ from operator import itemgetter
 from typing import Any, NamedTuple
 
 from space_robot_msgs_py.bag.flight_log import FlightLog
+from space_robot_msgs_py.errors import InputError
 
 from ..analysis.analysed_log import AnalysedLog
 from ..analysis.measure import evaluate, names
@@ -27,6 +28,13 @@ class Criterion(NamedTuple):
     """Metrics that it needs beside `METRICS`."""
     near: float = math.inf
     """Only laws count whose median error is within this factor of the least."""
+
+    def check(self, flight: AnalysedLog) -> None:
+        """Raise `InputError` if a flight lacks numbers that count."""
+        known = [*names(flight, GROUPS)]
+        for needed in (*self.errors, *self.metrics):
+            if not any(fnmatchcase(name, needed) for name in known):
+                raise InputError(f"this flight has no {needed}, for which the law is chosen")
 
     def of(self, log: FlightLog) -> dict[str, float]:
         """Return the metrics of a complete flight that scores, reasons and this one need."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -60,14 +61,14 @@ class ChoiceOptions:
     """Largest ripple of the torques, as a share of the largest one in the mission."""
     laws: tuple[str, ...] = ()
     """That take part, also ``file.py:Class``; empty: all of this project."""
-    evaluations: int = 160
+    evaluations: int = 80
     """Gain sets tried for each law."""
     is_short: bool = False
     """Whether few numbers of each law are searched, at the ripple allowed only."""
     trial_s: float = 12.0
     """Duration of a trial, s: of a longer mission the beginning is flown, and of a slow one as
     much as it takes until it is fast, see `fast_at`."""
-    runs: int = 24
+    runs: int = 12
     """Draws that every candidate flies."""
     seed: int = 1
     workers: int = 0
@@ -101,13 +102,17 @@ def prepare(
         InputError: the scenario cannot be flown, or it has no such law.
     """
     names = tuple(dict.fromkeys(options.laws)) or tuple(sorted(laws()))
+    controllers = [Law.parse(law).controller for law in names]
+    kinds = [find_law(controller).name for controller in controllers]
+    for name, count in Counter(kinds).items():
+        if count > 1:
+            raise InputError(f"law {name}: named twice, with or without gains of its own")
     for_tuning = {key: scenario[key] for key in TUNED if key in scenario}
     tuned = _tuned(for_tuning, str(scenario.get("case", WITHOUT_PAYLOAD)))
     write_set(tuned, command, folder / TUNED_SET)
     gains = f"{folder}/{TUNED_SET}"
-    for law in names:
-        kind = find_law(Law.parse(law).controller)
-        if "=" not in law and kind.name not in tuned.laws:
+    for law, controller in zip(names, controllers, strict=True):
+        if "=" not in law and controller not in tuned.laws:
             raise InputError(f"law {law}: has no tuned gains: give some, {law}=GAINS")
     search = LawSearch(names, dict(scenario), gains, {}, options)
     nominal = Scenario(**search.scenario_with(names[0])).check()
@@ -115,11 +120,13 @@ def prepare(
     friction = coefficients(known, nominal.plant_settings.friction)[: known.n]
     if (duration := nominal.ticks * nominal.period) < SHORTEST_S:
         raise InputError(f"a search needs {SHORTEST_S:g} s of flight or more, got {duration:g} s")
+    log = AnalysedLog(empty_log(nominal, 0, 1, is_brief=True))
+    CRITERIA[options.criterion].check(log)
     peak = force_demand(known, nominal.scenario.mission, [nominal.scenario.plant]).peak
     search = replace(
         search,
         points=first_points(tuned, peak, options.ripple, nominal.period),
-        torques=_largest_torques(nominal, peak),
+        torques={name: float(np.mean(peak[axes])) for name, axes in log.torque_columns.items()},
         friction=friction,
         duration=min(duration, max(options.trial_s, fast_at(nominal))),
         controls_base=nominal.controls_base,
@@ -141,11 +148,6 @@ def has_estimate(law: str) -> bool:
     """Return True if a law has an estimate behind the low-pass of the set."""
     kind = find_law(law)
     return "h_bar" in kind.gain_descriptions() or kind.estimates_with_model
-
-
-def _largest_torques(flight: Flight, peak: Array) -> dict[str, float]:
-    columns = AnalysedLog(empty_log(flight, 0, 1, is_brief=True)).torque_columns
-    return {name: float(np.mean(peak[axes])) for name, axes in columns.items()}
 
 
 def fast_at(flight: Flight) -> float:

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from space_robot_control.guidance.limits import MissionLimits
 from space_robot_control.guidance.mission import MissionSettings
 from space_robot_control.guidance.segments import read_segments
+from space_robot_control.laws import laws
 from space_robot_model.robot import Robot
 from space_robot_model.robot.description import unit_remarks
 from space_robot_model.robot.files import is_urdf, read_content
@@ -37,6 +38,8 @@ TRIAL: Mapping[str, Any] = {"case": "1", "sensors": "fine", "navigation": "filte
 CONDITIONS = "friction, sensors fine and navigation filtered"
 HELD_S = 5.0
 """The candidates fly the first leg, and this long after it, s."""
+CHOICE = "choice"
+"""Folder of a longer choice by `space-robot choose`."""
 SHORT = ChoiceOptions(evaluations=48, trial_s=6.0, runs=6, is_short=True)
 """How the law is chosen: shorter than `space-robot choose` does."""
 
@@ -187,14 +190,15 @@ def make_robot(
         gains = place / OWN_GAINS
         (leg, *_) = read_segments(mission.segments)
         scenario = {"robot": str(place), **TRIAL, "duration": (leg.span or 0.0) + HELD_S}
-        choice, _ = recommend(scenario, gains, options, command)
-        if choice.law:
+        choice = recommend(scenario, gains, options, command)
+        if choice.law in laws():
             choice.install(gains, gains)
+        else:
+            make_default(TUNED_SET, gains)
+        if choice.law:
             own = replace(choice, scenario={"robot": f"{folder}/", **TRIAL})
             text = campaign_text(own, folder / OWN_GAINS, command)
             (place / CAMPAIGN_FILE).write_text(text, "utf-8")
-        else:
-            make_default(TUNED_SET, gains)
     advice = (
         f"With {CONDITIONS}: {choice.sentence}",
         tool_remark(robot, folder),
@@ -221,7 +225,7 @@ def check_replaceable(folder: Path, force: bool, files: Collection[str]) -> None
         raise InputError(f"{folder}: exists already: choose another with --out, or use --force")
     if not folder.is_dir():
         raise InputError(f"{folder}: exists and is not a folder; it is not replaced")
-    known = {*files, OWN_MISSION, OWN_GAINS, CAMPAIGN_FILE}
+    known = {*files, OWN_MISSION, OWN_GAINS, CAMPAIGN_FILE, CHOICE}
     if others := sorted(entry.name for entry in folder.iterdir() if entry.name not in known):
         raise InputError(f"{folder}: also contains {others[0]!r}: it is not replaced")
 

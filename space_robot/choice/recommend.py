@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -17,12 +17,11 @@ from ..campaign.verdicts.laws import PairedComparison
 from ..console.progress import counting_progress
 from ..flight.plan import Flight
 from ..processes.scratch_folder import ScratchFolder
-from ..tuning.method import Tuned
 from .candidates import Candidate, FlownCandidate, comparisons, fly_candidates, select
 from .criteria import CRITERIA
 from .front import Front
 from .gain_files import install, write_gains
-from .law_search import TUNED_SET, ChoiceOptions, has_estimate, prepare
+from .law_search import TUNED_SET, ChoiceOptions, LawSearch, has_estimate, prepare
 from .trials import Uncertainty
 
 FAR, FEWEST = 10.0, 4
@@ -60,23 +59,25 @@ class Recommendation:
     def sentence(self) -> str:
         """The recommendation and its reason."""
         if not self.order:
-            return "No law flies this mission with these sensors and actuators."
-        criterion = CRITERIA[self.options.criterion]
-        best = self.order[0]
-        reason = f"of {len(self.flown)} laws it has" if len(self.flown) > 1 else "no other can;"
-        text = f"Fly {best.law}: {reason} the least {criterion.text}"
-        text += f" ({best.median(criterion.value):.3g} in the median of {len(best.flights)} draws)"
+            return f"None of {len(self.fronts)} laws flies this mission within these limits."
+        criterion, best = CRITERIA[self.options.criterion], self.order[0]
+        number = f"{best.median(criterion.value):.3g} in the median of {len(best.flights)} draws"
         if not self.compared:
-            return f"{text}."
-        worse = [c.other for c in self.compared if c.finding == "better"]
-        alike = [c.other for c in self.compared if c.finding != "better"]
-        parts = []
-        if worse:
-            ratio = 1.0 / next(c.ratio.value for c in self.compared if c.other == worse[0])
-            parts.append(f"{worse[0]}, the next one, has {ratio:.3g} times as much")
-        if alike:
+            only = f", the only one of {len(self.fronts)} laws within limits" if self.out else ""
+            return f"Fly {best.law}{only}: {criterion.text} is {number}."
+        by_finding: dict[str, list[str]] = {}
+        for each in self.compared:
+            by_finding.setdefault(each.finding, []).append(each.other)
+        fit = f"of {len(self.order)} laws within the limits"
+        parts = [f"Fly {best.law}: {fit} it has the least {criterion.text} ({number})"]
+        if worse := by_finding.get("better"):
+            ratio = next(1.0 / c.ratio.value for c in self.compared if c.other == worse[0])
+            parts.append(f"{worse[0]} has {ratio:.3g} times as much")
+        if alike := by_finding.get("alike"):
             parts.append(f"{' and '.join(alike)} cannot be told from it")
-        return f"{text}; {'; '.join(parts)}."
+        if rivals := by_finding.get("worse"):
+            parts.append(f"{' and '.join(rivals)} had less in most draws")
+        return f"{'; '.join(parts)}."
 
     def install(self, folder: Path, gains: Path) -> Path:
         """Make the law with its gains the default of a robot; return the set's folder.
@@ -109,7 +110,7 @@ class Recommendation:
 
 def recommend(
     scenario: Mapping[str, Any], folder: Path, options: ChoiceOptions, command: str
-) -> tuple[Recommendation, Tuned]:
+) -> Recommendation:
     """Search the front of each law, fly a candidate of each with many draws, and rank them.
 
     Args:
@@ -118,57 +119,63 @@ def recommend(
         options: of the choice.
         command: the user's command, for the files' headers.
 
-    Returns:
-        The choice, and the gains from which the search began.
-
     Raises:
         InputError: the scenario cannot be flown, or it has no such law.
     """
+    criterion = CRITERIA[options.criterion]
     with ScratchFolder() as place:
         search, nominal, tuned = prepare(scenario, Path(place), options, command)
-        names, searched = search.laws, search.fronts()
-    write_set(tuned, command, folder / TUNED_SET)
-    fronts = {front.law: front for front in searched}
-    best = {f.law: tried for f in searched if (tried := f.within(options.ripple))}
-    out = {f.law: f.why_none(options.goal) for f in searched if f.law not in best}
-    by_error = sorted(best, key=lambda law: best[law].score.error)
-    for law in by_error[FEWEST:]:
-        if (ratio := best[law].score.error / best[by_error[0]].score.error) > FAR:
-            out[law] = f"{ratio:.3g} times the least error in trials"
+        fronts = {front.law: front for front in search.fronts()}
+        best = {f.law: tried for f in fronts.values() if (tried := f.within(options.ripple))}
+        out = {f.law: f.why_none(options.goal) for f in fronts.values() if f.law not in best}
+        by_error = sorted(best, key=lambda law: best[law].score.error)
+        for law in by_error[FEWEST:]:
+            if (ratio := best[law].score.error / best[by_error[0]].score.error) > FAR:
+                out[law] = f"{ratio:.3g} times the least error in trials"
+        candidates = {
+            front.law: _candidates(search, name, front, Path(place))
+            for name, front in zip(search.laws, fronts.values(), strict=True)
+            if front.law in best
+        }
+        study = candidates_study(scenario, nominal, options.uncertainty)
 
-    def quieter(name: str, front: Front) -> Iterator[Candidate]:
-        controller, before = Law.parse(name).controller, None
-        for share in QUIETER:
-            tried = front.within(share * options.ripple)
-            if tried is not None and (before is None or tried.score is not before.score):
-                point = search.space(name).at(tried.point)
-                where = write_gains(controller, point, folder / front.law, command, tried.score)
-                yield Candidate(front.law, controller, point, tried.score, f"{where}/")
-            before = tried
+        def fly(some: Sequence[Candidate], runs: int, seed: int) -> list[FlownCandidate]:
+            for each in some:
+                write_gains(each.controller, each.gains, Path(each.folder), command, each.score)
+            with counting_progress("flights of the candidates") as begin:
+                how = options.criterion, runs, seed, options.workers, begin
+                return fly_candidates(study, some, *how)
 
-    study = candidates_study(scenario, nominal, options.uncertainty)
-    criterion = CRITERIA[options.criterion]
-
-    def fly(candidates: Sequence[Candidate], runs: int, seed: int) -> list[FlownCandidate]:
-        with counting_progress("flights of the candidates") as begin:
-            how = options.criterion, runs, seed, options.workers, begin
-            return fly_candidates(study, candidates, *how)
-
-    waiting: dict[str, Iterator[Candidate]] = {}
-    for name, front in zip(names, searched, strict=True):
-        own = quieter(name, front)
-        if front.law in out:
-            next(own, None)  # its gain files are written
-        else:
-            waiting[front.law] = own
-    by_law, order = select(waiting, fly, criterion, options.runs, options.seed)
+        waiting = {law: iter(own) for law, own in candidates.items() if law not in out}
+        by_law, order = select(waiting, fly, criterion, options.runs, options.seed)
     flown = list(by_law.values())
     out |= {each.law: each.reason for each in flown if each.reason}
+    for each in flown:
+        if each not in order and not each.reason:
+            out[each.law] = f"more than {criterion.near:g} times the least error"
+    write_set(tuned, command, folder / TUNED_SET)
+    for law, (first, *_) in candidates.items():
+        last = by_law[law].candidate if law in by_law else first
+        write_gains(last.controller, last.gains, folder / law, command, last.score)
     compared = comparisons(order, criterion) if order else []
-    choice = Recommendation(
-        dict(scenario), options, fronts, flown, order, compared, out, study.vary
-    )
-    return choice, tuned
+    return Recommendation(dict(scenario), options, fronts, flown, order, compared, out, study.vary)
+
+
+def _candidates(search: LawSearch, name: str, front: Front, place: Path) -> list[Candidate]:
+    """Return a law's gain sets of least error with the ripple allowed and with less."""
+    allowed = search.options.ripple
+    sets = {id(t): t for share in QUIETER if (t := front.within(share * allowed))}
+    controller, space = Law.parse(name).controller, search.space(name)
+    return [
+        Candidate(
+            front.law,
+            controller,
+            space.at(tried.point),
+            tried.score,
+            f"{place}/{front.law}.{number}/",
+        )
+        for number, tried in enumerate(sets.values())
+    ]
 
 
 def candidates_study(

@@ -44,11 +44,9 @@ def candidates_table(choice: Recommendation, notes: Sequence[str] = ()) -> Table
             verdict = JudgedCell("", "chosen", "good")
         elif law in choice.out:
             verdict = JudgedCell(f"{choice.out[law]}:", "out", "bad")
-        elif law in comparisons:
+        else:
             word = {"better": "worse", "worse": "better"}.get(comparisons[law].finding, "alike")
             verdict = JudgedCell(f"{1.0 / comparisons[law].ratio.value:.3g} times,", word, "open")
-        else:
-            verdict = JudgedCell("too far from the least error:", "out", "bad")
         rows.append([order.get(law), law, value, ripple, verdict])
     columns = [
         Column("rank", "", "d"),
@@ -85,7 +83,8 @@ def report(choice: Recommendation) -> dict[str, Any]:
         },
         "compared": [
             {
-                "law": c.other,
+                "law": c.law,
+                "other": c.other,
                 "finding": c.finding,
                 "ratio": c.ratio.value,
                 "p": c.p_better,
@@ -106,7 +105,8 @@ def report(choice: Recommendation) -> dict[str, Any]:
 
 def campaign_text(choice: Recommendation, folder: Path, command: str) -> str:
     """Return a campaign of the best laws, which continues the comparison."""
-    laws = [f"{each.law}={folder / each.law}/" for each in choice.order[:CAMPAIGN_LAWS]]
+    best = choice.order[:CAMPAIGN_LAWS]
+    laws = [f"{each.candidate.controller}={folder / each.law}/" for each in best]
     study = {
         "scenario": dict(choice.scenario),
         "laws": laws,
@@ -173,6 +173,7 @@ def write_report(choice: Recommendation, folder: Path, command: str) -> Path:
     )
     write_text(text, folder / "index.html", replace=True)
     write_text(json_text(report(choice)), folder / "choice.json", replace=True)
+    (folder / CAMPAIGN).unlink(missing_ok=True)  # of an earlier choice
     if choice.order:
-        write_text(campaign_text(choice, folder, command), folder / CAMPAIGN, replace=True)
+        write_text(campaign_text(choice, folder, command), folder / CAMPAIGN)
     return folder / "index.html"

@@ -39,11 +39,13 @@ class Factor(NamedTuple):
     """One factor for all axes; else the base has one, and the joints have another."""
     is_low_pass: bool = False
     """Whether the gain is a low-pass's bandwidth in rad/s: its range is the frequencies'."""
+    is_value: bool = False
+    """Whether the range is that of the gain, not of the factor."""
 
 
 def bandwidth(**powers: float) -> Factor:
     """Return the factor on a bandwidth W, of which gains are powers."""
-    return Factor(BANDWIDTH, powers, 0.05, 50.0)
+    return Factor(BANDWIDTH, {k.rstrip("_"): power for k, power in powers.items()}, 0.05, 50.0)
 
 
 SLOWEST_RAD_S, FASTEST_RAD_S = 0.1, 200.0
@@ -169,12 +171,13 @@ class SearchSpace:
         self._known = {name: np.zeros(count) for name in ("coulomb", "viscous", "dead_band")}
         self._known["coulomb"][BASE_AXES:], self._known["viscous"][BASE_AXES:] = friction.T
         self._known["dead_band"][BASE_AXES:] = DEAD_BAND_RATE
+        self._has_integral = INTEGRAL in KNOWN.get(law.name, ())
         factors = KNOWN.get(law.name) or _factor_per_gain(law, start.gains)
         parts = {BASE: slice(0, BASE_AXES)} if controls_base else {}
         parts |= {JOINTS: slice(BASE_AXES, None)}
         self.coordinates: list[Coordinate] = []
         for factor in factors:
-            powers = {name.rstrip("_"): power for name, power in factor.powers.items()}
+            powers = factor.powers
             if not any(self._reference(name, start.gains).any() for name in powers):
                 continue  # h_bar of the nominal model, or no friction
             if factor is DEAD_BAND and not friction[:, 0].any():
@@ -185,6 +188,8 @@ class SearchSpace:
                 self._hold(powers, bandwidth / start.bandwidth)
             else:
                 for part, axes in ({"": slice(None)} if factor.is_common else parts).items():
+                    if not any(self._reference(name, start.gains)[axes].any() for name in powers):
+                        continue
                     low, high = self._ends(factor, powers, axes)
                     numbers = part + factor.name, powers, axes, low, high, factor.is_low_pass
                     self.coordinates.append(Coordinate(*numbers))
@@ -210,6 +215,10 @@ class SearchSpace:
             gains = self.start.gains
             fastest = float(max(np.max(gains[name][axes]) for name in powers))
             return 2.0 * np.pi * SLOWEST_HZ / fastest, 2.0 * np.pi * FASTEST_HZ / fastest
+        if factor.is_value:
+            values = self.start.gains[factor.name][axes]
+            values = values[values != 0.0]
+            return min(1.0, factor.lowest / values.min()), max(1.0, factor.highest / values.max())
         if factor.name == BANDWIDTH and self.start.bandwidth:
             slowest, fastest = SLOWEST_RAD_S, FASTEST_RAD_S
             return slowest / self.start.bandwidth, fastest / self.start.bandwidth
@@ -223,10 +232,13 @@ class SearchSpace:
     @property
     def origin(self) -> Array:
         """The point (d,) of the start, with the known friction fed forward."""
-        origin: Array = -self._low / (self._high - self._low)
+        factors = np.zeros(self.dimension)
         for k, coordinate in enumerate(self.coordinates):
-            if "k_i" in coordinate.powers and not self.start.gains["k_i"].any():
-                origin[k] = 0.5  # in the middle of its range
+            if self._has_integral and "k_i" in coordinate.powers:
+                share = np.mean(self.start.gains["k_i"] / _fast_integral(self.start.gains))
+                middle = 0.5 * (self._low[k] + self._high[k])
+                factors[k] = math.log(share) if share else middle
+        origin: Array = (factors - self._low) / (self._high - self._low)
         return np.clip(origin, 0.0, 1.0)
 
     @property
@@ -260,11 +272,9 @@ class SearchSpace:
 
     def _reference(self, name: str, gains: Mapping[str, Array]) -> Array:
         """Return what a factor on a gain (m,) counts from."""
-        if gains[name].any():
-            return gains[name]
-        if name == "k_i":
+        if self._has_integral and name == "k_i":
             return _fast_integral(gains)
-        return self._known.get(name, gains[name])
+        return gains[name] if gains[name].any() else self._known.get(name, gains[name])
 
 
 def _shares(values: Sequence[float], lowest: float, highest: float) -> list[float]:
@@ -282,12 +292,11 @@ def _fast_integral(gains: Mapping[str, Array]) -> Array:
 def _factor_per_gain(law: type[ControlLaw], gains: Mapping[str, Array]) -> list[Factor]:
     """Return a factor on each gain of a user's law, within the range that it declares."""
     factors = []
-    for name, values in gains.items():
-        if not values.any():
-            continue
-        low, high = 1.0 / OWN_RANGE, OWN_RANGE
-        if (declared := law.gain_ranges().get(name)) and not declared.per_inertia:
-            middle = float(np.median(values[values > 0.0]))
-            low, high = max(declared.lower, 1e-3 * middle) / middle, declared.upper / middle
-        factors.append(Factor(name, {name: 1.0}, min(low, 1.0), max(high, 1.0)))
+    for name in gains:
+        declared = law.gain_ranges().get(name)
+        if declared and not declared.per_inertia:
+            low, high = max(declared.lower, 1e-3 * declared.upper), declared.upper
+            factors.append(Factor(name, {name: 1.0}, low, high, is_value=True))
+        else:
+            factors.append(Factor(name, {name: 1.0}, 1.0 / OWN_RANGE, OWN_RANGE))
     return factors

@@ -50,10 +50,7 @@ def first_points(tuned: Tuned, peak: Array, ripple: float, period: float) -> dic
     for law, own in tuned.laws.items():
         faster = max(1.0, LEAST_BANDWIDTH / own.bandwidth)
         powers = next(factor.powers for factor in KNOWN[law] if factor.name == BANDWIDTH)
-        gains = {
-            name: values * faster ** powers.get(name.rstrip("_"), powers.get(f"{name}_", 0.0))
-            for name, values in own.gains.items()
-        }
+        gains = {name: own.gains[name] * faster ** powers.get(name, 0.0) for name in own.gains}
         gains |= absolute.get(law, {})
         points[law] = GainPoint(gains, tuned.corner_hz, own.bandwidth * faster)
     return points

@@ -71,27 +71,28 @@ class Uncertainty:
         """Return the same as distributions of a campaign.
 
         Args:
-            own_friction: whether the robot's file has friction of its joints; else the case has.
+            own_friction: whether the robot's file has friction of some joints.
         """
 
         def within(share: float) -> dict[str, Any]:
             return {"uniform": [1.0 - share, 1.0 + share]}
 
-        relative: Any = {"relative": True}
-        friction = "robot.joints[*].friction" if own_friction else "plant.friction"
-        return {
-            **{
-                f"robot.{body}.{number}": within(self.mass) | relative
-                for body in ("base", "links[*]")
-                for number in ("mass", "inertia")
-            },
-            **{
-                f"{friction}.{kind}": within(self.friction) | relative
-                for kind in ("coulomb", "viscous")
-            },
-            "faults": {"torque_scale@0:all": within(self.torque_scale)},
-            "plant.command_latency_ticks": {"choice": list(range(self.latency_ticks + 1))},
-        }
+        vary: dict[str, Any] = {}
+        if self.mass:
+            for body in ("base", "links[*]"):
+                for number in ("mass", "inertia"):
+                    vary[f"robot.{body}.{number}"] = {**within(self.mass), "relative": True}
+        if self.friction:
+            for where in ("plant", "robot.joints[*]") if own_friction else ("plant",):
+                for kind in ("coulomb", "viscous"):
+                    friction = {**within(self.friction), "relative": True}
+                    vary[f"{where}.friction.{kind}"] = friction
+        if self.torque_scale:
+            vary["faults"] = {"torque_scale@0:all": within(self.torque_scale)}
+        if self.latency_ticks:
+            later = {"choice": list(range(self.latency_ticks + 1)), "offset": True}
+            vary["plant.command_latency_ticks"] = later
+        return vary
 
 
 class Score(NamedTuple):

@@ -101,9 +101,11 @@ def choose(
       space-robot choose my_robot/ --law my_law.py:MyLaw=my_law.yaml --law ctc
     """
     from space_robot_control.laws import laws as shipped_laws
-    from space_robot_model.robot.find import robot_as_path, robot_files
+    from space_robot_model.robot.find import OWN_GAINS, robot_as_path, robot_files
+    from space_robot_msgs_py.errors import SpaceRobotError
 
     from ..choice import ChoiceOptions, Uncertainty, recommend
+    from ..choice.new_robot import CHOICE
     from ..choice.report import CAMPAIGN, candidates_table, report, write_report
     from ..console.terminal import echo_json, print_table, terminal
     from ..flight.compilation import compile_lanes
@@ -123,19 +125,16 @@ def choose(
         name: value for name, value in options.items() if value not in (None, {}, "")
     }
     files = robot_files(scenario["robot"])
-    is_own = files.gains is not None and "/" in scenario["robot"]
-    folder = out or (
-        Path(robot) / "choice" if is_own and Path(robot).is_dir() else Path("choices") / files.name
-    )
+    own_folder = files.file.parent
+    is_own = files.gains == own_folder / OWN_GAINS
+    folder = out or (own_folder / CHOICE if is_own else Path("choices") / files.name)
     command = shlex.join(["space-robot", "choose", *context.meta[WORDS]])
     compile_lanes()
-    choice, _ = recommend(scenario, folder, wanted, command)
+    choice = recommend(scenario, folder, wanted, command)
     page = write_report(choice, folder, command)
-    chosen = (
-        choice.install(folder, files.gains)
-        if is_own and files.gains and choice.law in shipped_laws()
-        else None
-    )
+    chosen = None
+    if is_own and choice.law in shipped_laws():
+        chosen = choice.install(folder, own_folder / OWN_GAINS)
     if as_json:
         echo_json(report(choice))
     else:
@@ -144,5 +143,9 @@ def choose(
     if chosen:
         click.echo(f"{robot} flies {choice.law} with gains {chosen} from now on", err=True)
     elif choice.law:
-        click.echo(f"to fly it: --controller {choice.law} --gains {folder / choice.law}/", err=True)
-    click.echo(f"{page} has the fronts; {folder / CAMPAIGN} goes on with the best laws", err=True)
+        controller = choice.order[0].candidate.controller
+        click.echo(f"to fly it: --controller {controller} --gains {folder / choice.law}/", err=True)
+    click.echo(f"{page} has the fronts", err=True)
+    if not choice.law:
+        raise SpaceRobotError(f"no law flies {robot}: see the table")
+    click.echo(f"{folder / CAMPAIGN} goes on with the best laws", err=True)

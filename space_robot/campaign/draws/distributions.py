@@ -88,7 +88,9 @@ class Distribution(StrictModel):
         """Apply a drawn value to a nominal one: as factor, offset or replacement."""
         if self.relative:
             return nominal * float(drawn)
-        return nominal + float(drawn) if self.offset else drawn
+        if self.offset:  # a whole number of ticks remains one
+            return nominal + (drawn if isinstance(drawn, int) else float(drawn))
+        return drawn
 
     def at_least(self, factor: float, nominal: float) -> Distribution:
         """Return the distribution with results of at least ``factor`` times the nominal value."""

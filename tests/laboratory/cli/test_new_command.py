@@ -78,7 +78,7 @@ def test_a_file_becomes_a_folder_that_flies(
     assert list(report["laws"]) == ["ctc", "pd"]
     assert [entry.name for entry in tmp_path.iterdir()] == ["mine"]
     assert (best := report["default_law"]) == "ctc"
-    assert f"Fly {best}: of 2 laws it has the least" in report["remarks"][0]
+    assert f"Fly {best}: of 2 laws within the limits it has the least" in report["remarks"][0]
     plain = json.loads(run("simulate", "--robot", "mine", "--duration", "0.01", "--json").stdout)
     assert plain["controller"] == best
     assert Flight(resolve(Scenario(robot="mine"))).description["mission"] == "mine"
