@@ -34,7 +34,7 @@ class Criterion(NamedTuple):
         known = [*names(flight, GROUPS)]
         for needed in (*self.errors, *self.metrics):
             if not any(fnmatchcase(name, needed) for name in known):
-                raise InputError(f"this flight has no {needed}, for which the law is chosen")
+                raise InputError(f"least {self.text}: this flight has no {needed}")
 
     def of(self, log: FlightLog) -> dict[str, float]:
         """Return the metrics of a complete flight that scores, reasons and this one need."""

@@ -59,7 +59,7 @@ class Recommendation:
     def sentence(self) -> str:
         """The recommendation and its reason."""
         if not self.order:
-            return f"None of {len(self.fronts)} laws flies this mission within these limits."
+            return "No law flies this mission within these limits."
         criterion, best = CRITERIA[self.options.criterion], self.order[0]
         number = f"{best.median(criterion.value):.3g} in the median of {len(best.flights)} draws"
         if not self.compared:

@@ -138,8 +138,9 @@ def test_a_law_is_chosen_with_gains_that_fly_and_files_that_say_why(
     assert report["sentence"] in Path("a/index.html").read_text("utf-8")
     study = yaml.safe_load(Path("a/campaign.yaml").read_text("utf-8"))
     assert study["laws"][0] == f"{report['law']}=a/{report['law']}/"
-    again = json.loads(choose(*words, "--out", "b").stdout)
-    assert again["fronts"] == report["fronts"], "the same seed gives the same numbers"
+    again = json.loads(choose(*words, "--out", "b", "--workers", "1").stdout)
+    for what in ("fronts", "candidates", "compared"):
+        assert again[what] == report[what], "the same seed gives the same numbers"
 
 
 def test_a_law_of_ones_own_takes_part(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -147,14 +148,23 @@ def test_a_law_of_ones_own_takes_part(tmp_path: Path, monkeypatch: pytest.Monkey
     assert CliRunner().invoke(cli, ("new", "law", "my_law")).exit_code == 0
     own = "my_law.py:MyLaw"
     with_gains = ("--law", f"{own}=my_law.yaml", "--law", "ctc", *SHORT, "--ripple", "1")
-    result = choose("paper", *with_gains, "--json")
+    result = choose("paper", *with_gains, "--json", "--mass-uncertainty", "0")
     assert result.exit_code == 0, result.exception
     report = json.loads(result.stdout)
     assert set(report["fronts"]) == {"my_law", "ctc"}
     assert Path("choices/paper/my_law/my_law.yaml").is_file()
+    study = yaml.safe_load(Path("choices/paper/campaign.yaml").read_text("utf-8"))
+    assert f"{own}=choices/paper/my_law/" in study["laws"]
+    assert "robot.base.mass" not in study["vary"]
     refused = choose("paper", "--law", own, *SHORT)
     assert isinstance(refused.exception, InputError)
     assert "my_law.py:MyLaw=GAINS" in str(refused.exception)
+
+
+@pytest.mark.parametrize("words", [("--law", "ctc=x/"), ("--for", "pointing")])
+def test_two_laws_of_one_name_or_a_base_without_errors_are_refused(words: tuple[str, ...]) -> None:
+    result = choose("paper", "--law", "ctc", "--actuators", "none", *SHORT, *words)
+    assert isinstance(result.exception, InputError)
 
 
 def test_a_flight_too_short_to_judge_is_refused(tmp_path: Path) -> None:

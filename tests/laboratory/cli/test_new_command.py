@@ -67,6 +67,22 @@ def quickly(monkeypatch: pytest.MonkeyPatch, *of_laws: str) -> None:
     monkeypatch.setattr("space_robot.choice.new_robot.SHORT", short)
 
 
+def test_choose_sets_the_law_of_ones_own_robot_and_of_no_shipped_one(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    quickly(monkeypatch, "ctc")
+    Path("paper.yaml").write_text((CONFIG / "robots/paper.yaml").read_text("utf-8"), "utf-8")
+    assert new("paper.yaml", "--out", "mine", "--workers", "0").exit_code == 0
+    words = ("--law", "pd", "--evaluations", "1", "--runs", "2", "--duration", "1.1")
+    other = ("choose", "./paper.yaml", *words, "--ripple", "10", "--workers", "0")
+    assert "to fly it: --controller pd" in run(*other).stderr
+    assert not (CONFIG / "gains/paper/chosen").exists()
+    own = run("choose", "mine/robot.yaml", *other[2:])
+    assert "mine/robot.yaml flies pd with gains mine/gains/chosen from now on" in own.stderr
+    assert resolve(Scenario(robot="mine/")).law.name == "pd"
+    assert new("paper.yaml", "--out", "mine", "--workers", "0", "--force").exit_code == 0
+
+
 def test_a_file_becomes_a_folder_that_flies(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
