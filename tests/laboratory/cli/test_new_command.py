@@ -22,6 +22,7 @@ from space_robot.choice.new_robot import (
     BASE_TORQUE,
     DAMPING_RATIO,
     FREQUENCY_HZ,
+    check_replaceable,
     hinge_remark,
     mission_text,
     rest_to_rest,
@@ -45,6 +46,7 @@ from space_robot_sim.environment.environment import EnvironmentSettings
 
 FILE = str(CONFIG / "robots/ets_vii.yaml")
 ARM = DATA / "arm.urdf"
+FEW = ("--evaluations", "1", "--runs", "2", "--workers", "0")
 KINDS = {kind.name: kind for kind in (LAW, SENSOR, METRIC, MISSION)}
 
 
@@ -71,23 +73,23 @@ def test_choose_sets_the_law_of_ones_own_robot_and_of_no_shipped_one(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     quickly(monkeypatch, "ctc")
-    Path("paper.yaml").write_text((CONFIG / "robots/paper.yaml").read_text("utf-8"), "utf-8")
-    assert new("paper.yaml", "--out", "mine", "--workers", "0").exit_code == 0
-    words = ("--law", "pd", "--evaluations", "1", "--runs", "2", "--duration", "1.1")
-    other = ("choose", "./paper.yaml", *words, "--ripple", "10", "--workers", "0")
-    assert "to fly it: --controller pd" in run(*other).stderr
-    assert not (CONFIG / "gains/paper/chosen").exists()
-    own = run("choose", "mine/robot.yaml", *other[2:])
+    made = new(str(ARM), "--out", "mine", *FEW)
+    assert made.exit_code == 0, made.exception
+    words = ("--law", "pd", *FEW, "--duration", "1.1", "--ripple", "10")
+    own = run("choose", "mine/robot.yaml", *words)
     assert "mine/robot.yaml flies pd with gains mine/gains/chosen from now on" in own.stderr
     assert resolve(Scenario(robot="mine/")).law.name == "pd"
-    assert new("paper.yaml", "--out", "mine", "--workers", "0", "--force").exit_code == 0
+    check_replaceable(Path("mine"), force=True, files=["robot.yaml", ARM.name])
+    Path("paper.yaml").write_text((CONFIG / "robots/paper.yaml").read_text("utf-8"), "utf-8")
+    assert "to fly it: --controller pd" in run("choose", "./paper.yaml", *words).stderr
+    assert not (CONFIG / "gains/paper/chosen").exists()
 
 
 def test_a_file_becomes_a_folder_that_flies(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     quickly(monkeypatch, "ctc", "pd")
-    result = new(FILE, "--out", "mine", "--evaluations", "1", "--workers", "0", "--json")
+    result = new(FILE, "--out", "mine", *FEW, "--json")
     assert result.exit_code == 0, result.exception
     assert "made mine/: `space-robot fly --robot mine/` flies it" in result.stderr
     report = json.loads(result.stdout)
