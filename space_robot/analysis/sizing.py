@@ -11,9 +11,8 @@ from collections.abc import Iterator, Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from space_robot_model.elementary.matrices import product
+from space_robot_model.elementary.matrices import Array, product
 from space_robot_model.hardware.base_actuators import (
     BaseActuatorSettings,
     ThrusterSettings,
@@ -35,8 +34,6 @@ from .actuation import ROUNDING, wheel_motion
 from .analysed_log import AnalysedLog
 from .external_torques import body_axes
 from .series import Definition, metrics
-
-Array = NDArray[np.float64]
 
 
 class ActuatorSet(NamedTuple):

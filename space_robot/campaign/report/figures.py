@@ -14,7 +14,8 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.ticker import LogFormatterSciNotation, LogLocator, NullFormatter
-from numpy.typing import NDArray
+
+from space_robot_model.elementary.matrices import Array
 
 from ...analysis.figures.figure_set import Drawing
 from ...analysis.figures.style import (
@@ -35,8 +36,6 @@ from .findings import Findings, Quantity
 
 if TYPE_CHECKING:
     from pandas import DataFrame
-
-Array = NDArray[np.float64]
 
 SHARES = (0.05, 0.5, 0.95)
 MOST_PANELS = 12

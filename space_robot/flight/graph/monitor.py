@@ -6,9 +6,7 @@ import math
 from contextlib import suppress
 from typing import Any, NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
+from space_robot_model.elementary.matrices import Array
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.config.validation import relative
 from space_robot_msgs_py.errors import MessageError
@@ -18,8 +16,6 @@ from space_robot_msgs_py.wire.telemetry import TelemetryCodec
 
 from .node_names import PLANT
 from .node_services import TemporaryNode
-
-Array = NDArray[np.float64]
 
 MONITOR = "flight_monitor"
 """Name of the node with which a flight is followed."""

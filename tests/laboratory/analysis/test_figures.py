@@ -18,7 +18,6 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from numpy.typing import NDArray
 from PIL import Image
 from scipy import signal
 from strategies import random_log, random_robot
@@ -55,12 +54,12 @@ from space_robot.analysis.figures.style import (
 )
 from space_robot.analysis.plotted import PlottedQuantity, flown_quantities
 from space_robot_control.guidance.mission import Mission, MissionSettings
+from space_robot_model.elementary.matrices import Array
 from space_robot_model.hardware.base_actuators import BaseActuatorSettings
 from space_robot_model.robot import Robot
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.samples import Timebase
 
-Array = NDArray[np.float64]
 PERIOD = 0.0005
 PAPER_TIMES = (0.0, 15.0, 30.0)
 WHEELS = {"axes": PYRAMID, "max_momentum": [3.0], "max_torque": [0.5, 0.0, 0.5, 0.5]}
