@@ -271,10 +271,8 @@ class BaseDemand:
 
     def _held_by_wheels(self, start: int, stop: int) -> Array:
         rows, wheels = self._log.rows(start, stop), self._wheels
-        held, axes = (
-            product(wheels.spin_momenta(rows.wheel_velocities), wheels.unit_axes),
-            body_axes(rows),
-        )
+        held = product(wheels.spin_momenta(rows.wheel_velocities), wheels.unit_axes)
+        axes = body_axes(rows)
         if start == 0:
             self._taken = to_inertial(axes[:, :, :1], held[:1].T)
         at_first = to_base(axes, np.broadcast_to(self._taken, (3, len(held)))).T
