@@ -153,6 +153,14 @@ def hardware(**parts: dict[str, Any]) -> BaseActuatorSettings:
     return BaseActuatorSettings.model_validate({"base_actuation": "hardware", **parts})
 
 
+THRUSTER_PAIRS = {
+    "positions": flat([sign * axis for axis in np.eye(3) for sign in (1, -1, 1, -1)]),
+    "directions": flat([sign * np.roll(axis, 1) for axis in np.eye(3) for sign in (1, -1, -1, 1)]),
+    "force": [2.0],
+}
+"""Twelve thrusters, in pairs on levers of 1 m about +z, -z, +x, -x, +y, -y."""
+
+
 def random_thrusters(rng: np.random.Generator, count: int) -> BaseActuatorSettings:
     """Thrusters anywhere, in pairs that turn the base either way."""
     places, directions = rng.uniform(-2.0, 2.0, (count, 3)), rng.normal(size=(count, 3))

@@ -12,13 +12,12 @@ from typing import Any
 
 import pytest
 from command import Run, run_program
-from flights import space_robot_here
+from flights import planned, space_robot_here
 from paths import ROOT
 from robots import driven_paper
 
 from space_robot.export.folder import CROSS, EMULATORS
 from space_robot.export.software import export
-from space_robot.flight.plan import Flight, Scenario, resolve
 from space_robot_control.flight_code.folder import Exported
 from space_robot_control.laws import laws
 from space_robot_model.robot import Robot
@@ -225,7 +224,7 @@ RIGID: dict[str, Any] = {"sensors": "fine", "navigation": "filtered", "swaps": [
 
 
 def code_of(**options: Any) -> Exported:
-    return export(Flight(resolve(Scenario.model_validate(options))))
+    return export(planned(**options))
 
 
 def test_gears_and_orbit_of_the_plant_are_no_part_of_the_flight_software() -> None:
