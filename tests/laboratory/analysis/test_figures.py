@@ -8,8 +8,8 @@ from pathlib import Path
 import matplotlib
 import numpy as np
 import pytest
-from benches import WHEEL_AXES as PYRAMID
 from benches import THRUSTER_PAIRS, hardware, still_log
+from benches import WHEEL_AXES as PYRAMID
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays

@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from benches import WHEEL_AXES as PYRAMID
 from benches import THRUSTER_PAIRS, flat, hardware, still_log
+from benches import WHEEL_AXES as PYRAMID
 from oracles import quaternion_of
 from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
