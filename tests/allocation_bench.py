@@ -6,17 +6,16 @@ from functools import cache
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.optimize import linprog
 
 from space_robot_control.allocation.allocation import Allocation, allocation_code
 from space_robot_control.allocation.settings import AllocationSettings
 from space_robot_control.allocation.wheel_set import WheelSet, least_largest, tabulate
+from space_robot_model.elementary.matrices import Array
 from space_robot_model.hardware.base_actuators import BaseActuatorSettings
 from space_robot_msgs_py.compiled.kernels import RecordFunction
 from space_robot_msgs_py.samples import MOST_WHEELS, State
-
-Array = NDArray[np.float64]
 
 PERIOD = 5e-4
 INERTIA = 0.02

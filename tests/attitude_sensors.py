@@ -6,7 +6,6 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from oracles import skew
 from scipy.integrate import solve_ivp
 from scipy.linalg import expm, solve_discrete_are
@@ -19,9 +18,9 @@ from space_robot_control.navigation.attitude_filter import (
 )
 from space_robot_control.navigation.navigation import Navigation
 from space_robot_control.navigation.settings import NavigationFilterSettings
+from space_robot_model.elementary.matrices import Array
 from space_robot_msgs_py.compiled.kernels import kernel
 
-Array = NDArray[np.float64]
 Rate = Callable[[float], Array]
 
 

@@ -9,12 +9,11 @@ from typing import Any
 
 import numpy as np
 import yaml
+from flights import simulated
 from mcap.reader import make_reader
 from mcap.writer import Writer as McapWriter
 from rosbags.rosbag2 import StoragePlugin, Writer
 
-from space_robot.flight.plan import Flight, Scenario, resolve
-from space_robot.flight.simulate import simulate
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.bag.flight_log import REFERENCE, FlightLog
 from space_robot_msgs_py.bag.folder import open_bag, read_information
@@ -95,7 +94,7 @@ def record(
 ) -> Recorded:
     """A flight in a bag whose chunks end at the same ticks as the reference's messages."""
     flown = folder.with_name(folder.name + "_flown")
-    simulate(Flight(resolve(Scenario(duration=ticks * TIMEBASE.period))), flown)
+    simulated(flown, duration=ticks * TIMEBASE.period)
     recorder, states = BagRecorder(folder, FLIGHT, TIMEBASE, compression), 0
     for topic, data in messages_of(flown):
         if topic is topics.REFERENCE_JOINTS and states and states % ticks_a_chunk == 0:

@@ -5,10 +5,11 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from random_samples import random_sample
 from strategies import random_quaternion
 
+from space_robot_model.elementary.matrices import Array
 from space_robot_model.hardware.base_actuators import BaseActuatorSettings
 from space_robot_model.hardware.sensors import SensorSettings
 from space_robot_model.robot import Robot
@@ -27,8 +28,6 @@ from space_robot_sim.faults.grammar import parse_faults
 from space_robot_sim.faults.schedule import Schedule
 from space_robot_sim.plant.settings import PLANT_KINDS
 from space_robot_sim.sensors.sensors import Sensors, sense
-
-Array = NDArray[np.float64]
 
 PERIOD = 5e-4
 N = 6
@@ -152,6 +151,14 @@ def flat(vectors: ArrayLike) -> list[float]:
 def hardware(**parts: dict[str, Any]) -> BaseActuatorSettings:
     """Wheels, thrusters or both."""
     return BaseActuatorSettings.model_validate({"base_actuation": "hardware", **parts})
+
+
+THRUSTER_PAIRS = {
+    "positions": flat([sign * axis for axis in np.eye(3) for sign in (1, -1, 1, -1)]),
+    "directions": flat([sign * np.roll(axis, 1) for axis in np.eye(3) for sign in (1, -1, -1, 1)]),
+    "force": [2.0],
+}
+"""Twelve thrusters, in pairs on levers of 1 m about +z, -z, +x, -x, +y, -y."""
 
 
 def random_thrusters(rng: np.random.Generator, count: int) -> BaseActuatorSettings:

@@ -5,18 +5,16 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from space_robot_control.controller.controller import Controller
 from space_robot_control.controller.reference_buffer import ReferenceBuffer
 from space_robot_control.guidance.mission import Mission, MissionSettings
 from space_robot_control.laws import ControlLaw, find_law
 from space_robot_control.navigation.settings import NavigationFilterSettings
+from space_robot_model.elementary.matrices import Array
 from space_robot_model.robot import Robot
 from space_robot_sim.plant.plant import Plant
 from space_robot_sim.plant.settings import PlantSettings
-
-Array = NDArray[np.float64]
 
 PERIOD = 5e-4
 PAPER_DEG = [[0, 120, 220, 0, -10, 0], [15, 110, 185, 45, 10, -25], [30, 100, 150, 90, 30, -50]]

@@ -1,9 +1,10 @@
-"""What comes of a command that a test runs in its own process, with the fixture `space_robot`."""
+"""What comes of a command in the test's own process (fixture `space_robot`), and of a program."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import NamedTuple
+import subprocess
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
 
 
 class Ran(NamedTuple):
@@ -13,3 +14,8 @@ class Ran(NamedTuple):
 
 
 Run = Callable[..., Ran]
+
+
+def run_program(words: Sequence[str], **options: Any) -> subprocess.CompletedProcess[str]:
+    """Run a program to its end; ``options``: of `subprocess.run`."""
+    return subprocess.run(words, capture_output=True, text=True, check=False, **options)

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import pytest
+from command import run_program
 from forked import END_S, SPACE_ROBOT, Forked
 
 from space_robot_msgs_py.ros.locks import nodes_in
@@ -47,14 +48,7 @@ def space_robot(
     if python_path:
         paths = [str(python_path), environment.get("PYTHONPATH", "")]
         environment["PYTHONPATH"] = os.pathsep.join(path for path in paths if path)
-    return subprocess.run(
-        [*COMMAND, *arguments],
-        capture_output=True,
-        text=True,
-        timeout=timeout,
-        check=False,
-        env=environment,
-    )
+    return run_program([*COMMAND, *arguments], timeout=timeout, env=environment)
 
 
 def planned(**options: Any) -> Flight:

@@ -5,13 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.signal import lfilter
 
 from space_robot_control.laws import ControlLaw, Signals
+from space_robot_model.elementary.matrices import Array
 from space_robot_msgs_py.compiled.records import Block
 
-Array = NDArray[np.float64]
 Gains = dict[str, Array]
 
 PERIOD = 5e-4

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import yaml
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from oracles import rotation_of
 from oracles.momenta import state_of
 from oracles.orbit import body_places
@@ -15,6 +15,7 @@ from paths import CONFIG, DATA
 from strategies import with_gears
 
 from space_robot_model.dynamics.model import Model
+from space_robot_model.elementary.matrices import Array
 from space_robot_model.robot import Robot
 from space_robot_model.robot.gears import geared_joints
 from space_robot_model.robot.parts import Gear
@@ -29,7 +30,6 @@ from space_robot_sim.plant.plant import Plant
 from space_robot_sim.plant.settings import PlantSettings
 from space_robot_sim.plant.tick import update_true_state
 
-Array = NDArray[np.float64]
 PERIOD = 5e-4
 LOCKED = FrictionSettings(coulomb=1e6, viscous=0.0)
 """No joint breaks away: the robot is rigid."""

@@ -15,11 +15,11 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from space_robot.view.flights import ViewOptions, flights_page
+from space_robot_model.elementary.matrices import Array
 from space_robot_model.robot import Robot
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.samples import RobotNames, Timebase
 
-Array = NDArray[np.float64]
 Message = dict[str, Any]
 
 

@@ -8,16 +8,14 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from space_robot_model.elementary.matrices import Array
 from space_robot_model.robot import Robot
 from space_robot_model.robot.inertia import inertia_tensor
 from space_robot_model.robot.parts import Base, Body, Gear, JointFriction, RobotTree, Spring, Tool
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.samples import LawInForce, Timebase
-
-Array = NDArray[np.float64]
 
 JOINTS = (1, 3, 6, 7)
 """Numbers of joints of random robots."""

@@ -9,15 +9,15 @@ from typing import Any
 import cvxpy
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from paths import ROOT
+
+from space_robot_model.elementary.matrices import Array
 
 pytest.importorskip("daqp")
 
 from space_robot import Scenario
 from space_robot_control.laws import ControlLaw, Signals, find_law
 
-Array = NDArray[np.float64]
 AXES = 9
 LAW: Any = find_law(f"{ROOT / 'examples/mpc_law.py'}:ModelPredictiveControl")
 NO_LIMIT = 1e9

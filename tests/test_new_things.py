@@ -11,6 +11,7 @@ import click
 import numpy as np
 import pytest
 from bags import messages_of, read_accounts
+from flights import planned, simulated
 from paths import CONFIG, ROOT
 
 import space_robot.cli as room_of_commands
@@ -18,7 +19,6 @@ import space_robot_control.laws as room_of_laws
 from space_robot import load_bag
 from space_robot.cli.main import COMMANDS, cli
 from space_robot.flight.compilation import laws_with_gains
-from space_robot.flight.plan import Flight, Scenario, resolve
 from space_robot.flight.simulate import simulate
 from space_robot_control.laws import laws
 from space_robot_msgs_py import topics
@@ -57,10 +57,8 @@ def test_a_law_is_one_file_in_laws_and_one_of_gains(new_law: Path) -> None:
     """
     assert "newest" in laws()
     assert laws_with_gains().keys() == laws().keys() - {"newest"}
-    own = simulate(
-        Flight(resolve(Scenario(controller="newest", gains=str(new_law), duration=0.01)))
-    )
-    model = simulate(Flight(resolve(Scenario(controller=MODEL, gains="tuned", duration=0.01))))
+    own = simulate(planned(controller="newest", gains=str(new_law), duration=0.01))
+    model = simulated(controller=MODEL, gains="tuned", duration=0.01)
     assert own.commanded_torque is not None
     assert model.commanded_torque is not None
     np.testing.assert_array_equal(own.commanded_torque, model.commanded_torque)
@@ -83,7 +81,7 @@ def test_a_signal_is_one_line_and_its_topic_another(
     monkeypatch.setattr(topics, "ALL", (*topics.ALL, newest))
     monkeypatch.setattr(topics, "RECORDED", (*topics.RECORDED, newest))
     monkeypatch.setitem(topics.BY_NAME, newest.full_name, newest)
-    flight = Flight(resolve(Scenario(duration=0.01)))
+    flight = planned(duration=0.01)
     names = RobotNames(flight.robot.joint_names)
     codec = Codec(describe(newest, names, flight.timebase))
     simulate(flight, tmp_path / "flown")

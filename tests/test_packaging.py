@@ -14,6 +14,7 @@ from typing import Any
 from xml.etree import ElementTree
 
 import pytest
+from command import run_program
 from import_graph import PACKAGES, modules
 from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
@@ -224,10 +225,7 @@ def test_setup_py_describes_the_package_from_any_folder(tmp_path: Path) -> None:
     pytest.importorskip("setuptools")
     (tmp_path / "setup.py").symlink_to(ROOT / "setup.py")
     command = [sys.executable, "-c", f"import setuptools\n{DESCRIBE}"]
-    here, there = (
-        subprocess.run(command, cwd=folder, capture_output=True, text=True)
-        for folder in (ROOT, tmp_path)
-    )
+    here, there = (run_program(command, cwd=folder) for folder in (ROOT, tmp_path))
     assert there.stdout == here.stdout, there.stderr[-500:]
     assert "space_robot_sim.plant" in here.stdout
     assert "'config/cases/1.yaml'" in here.stdout

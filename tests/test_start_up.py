@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import subprocess
 import sys
 
 import pytest
+from command import run_program
 
 SLOW = {"matplotlib", "scipy.spatial", "scipy.signal", "scipy.optimize", "pyarrow"}
 """A tenth of a second of the processor's and more each; five processes start for a flight."""
@@ -28,5 +28,5 @@ def test_slow_libraries_are_imported_where_they_are_used(modules: str, slow: set
         code += "from click.shell_completion import ShellComplete as S; "
         code += "S(space_robot.cli.main.cli, {}, 'x', 'X').get_completions(['robot'], ''); "
     code += f"print(*sorted({slow!r} & set(sys.modules)))"
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    done = run_program([sys.executable, "-c", code])
     assert (done.stdout, done.returncode) == ("\n", 0), done.stderr

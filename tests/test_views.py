@@ -10,11 +10,10 @@ from xml.etree import ElementTree
 
 import pytest
 import yaml
+from flights import simulated
 from paths import CONFIG
 from rosbags.highlevel import AnyReader
 
-from space_robot.flight.plan import Flight, Scenario, resolve
-from space_robot.flight.simulate import simulate
 from space_robot_model.robot import Robot
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.wire.messages import TELEMETRY_ROWS
@@ -34,7 +33,7 @@ def test_there_are_three_layouts_and_none_names_a_file_of_a_machine() -> None:
 def seen(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
     """The last message of each topic in a bag."""
     bag = tmp_path_factory.mktemp("views") / "bag"
-    simulate(Flight(resolve(Scenario(duration=0.05))), bag)
+    simulated(bag, duration=0.05)
     with AnyReader([bag]) as reader:
         return {
             connection.topic: reader.deserialize(data, connection.msgtype)

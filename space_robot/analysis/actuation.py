@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from space_robot_model.elementary.matrices import Array
 from space_robot_model.hardware.base_actuators import WheelSettings
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.errors import InputError
@@ -13,8 +14,6 @@ from .analysed_log import AnalysedLog
 from .described import NO_LIMITS
 from .errors import joined_error, measured_rows, waypoint_ticks
 from .series import Definition, TimeSeries, largest_sizes, metrics, series
-
-Array = NDArray[np.float64]
 
 BAND = 1e-5
 """Largest |error| that counts as settled: rad or m on a joint; on eps, which is 4.1 arcsec."""

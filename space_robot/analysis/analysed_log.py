@@ -10,10 +10,9 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field, field_validator
 
-from space_robot_model.elementary.matrices import direction_norm
+from space_robot_model.elementary.matrices import Array, direction_norm
 from space_robot_model.hardware.base_actuators import BaseActuatorSettings
 from space_robot_model.robot import Robot
 from space_robot_model.robot.mission_document import Vector
@@ -27,8 +26,6 @@ from space_robot_msgs_py.topics import BASE_AXES
 
 from . import described
 from .errors import AxisIndex, attitude_error, axis_groups, controls_base
-
-Array = NDArray[np.float64]
 
 Z = (0.0, 0.0, 1.0)
 

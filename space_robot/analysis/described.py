@@ -15,8 +15,8 @@ from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from space_robot_model.elementary.matrices import Array
 from space_robot_model.hardware.base_actuators import BaseActuatorSettings
 from space_robot_model.robot import Robot
 from space_robot_msgs_py.bag.flight_log import FlightLog
@@ -32,8 +32,6 @@ from space_robot_sim.plant.settings import PlantNodeSettings
 from ..flight.start_step import StartStep
 from ..scenario.node_settings import FlightSettings
 from ..scenario.recorded import recorded_options, recorded_scenario
-
-Array = NDArray[np.float64]
 
 IDEAL = "ideal"
 """Name of the sensors without error."""

@@ -9,12 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from space_robot_model.dynamics.attitude import attitude_error_into
-from space_robot_model.elementary.matrices import dot_rows, norms, unit_rows
+from space_robot_model.elementary.matrices import Array, dot_rows, norms, unit_rows
 from space_robot_model.robot.placements import base_axes, to_base
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.compiled.kernels import kernel
-
-Array = NDArray[np.float64]
 
 AxisIndex = slice | list[int]
 """Some of the n+3 axes, as an index."""

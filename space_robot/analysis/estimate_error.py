@@ -14,9 +14,9 @@ from contextlib import suppress
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from space_robot_control.navigation.rate_filters import low_pass_weight
+from space_robot_model.elementary.matrices import Array
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.bag.law_history import laws_of
 from space_robot_msgs_py.errors import InputError
@@ -26,7 +26,6 @@ from .described import DIRECT, NotDescribedError, flown_name, flown_settings
 from .errors import applied_force, continuous_error, mean_acceleration, measured_rows
 from .series import Definition, TimeSeries, series
 
-Array = NDArray[np.float64]
 HBar = Callable[[FlightLog], Array]
 """h_bar in force in the rows of a log: (m,), or (N, m) with NaN under a law without an estimate, or
 with one of the nominal inertia."""

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from space_robot_model.elementary.matrices import Array
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.bag.law_history import as_data, laws_of
 from space_robot_msgs_py.config.installation import install_command
@@ -28,8 +29,6 @@ from .report import recording
 
 if TYPE_CHECKING:
     from pandas import DataFrame
-
-Array = NDArray[np.float64]
 
 BATCH = 16_384
 """Ticks that are laid out at a time; this bounds the memory of an export."""

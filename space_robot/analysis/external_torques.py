@@ -6,9 +6,8 @@ from collections.abc import Callable
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
-from space_robot_model.elementary.matrices import norms, unit_rows
+from space_robot_model.elementary.matrices import Array, norms, unit_rows
 from space_robot_model.robot import Robot
 from space_robot_model.robot.momentum import Motion, robot_momentum
 from space_robot_model.robot.placements import base_axes, cross, to_inertial
@@ -20,8 +19,6 @@ from space_robot_sim.environment.disturbance import DisturbanceSettings, LoadSch
 from .analysed_log import AnalysedLog
 from .described import flown_captures, plant_settings
 from .series import Definition, TimeSeries, series
-
-Array = NDArray[np.float64]
 
 SINES = "sines"
 """Name of the disturbance (61) among the sources."""

@@ -10,7 +10,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import yaml
-from numpy.typing import NDArray
 
 from space_robot_control.allocation.settings import assumed_actuators
 from space_robot_control.guidance.courses import BentLeg, Course, Piece, QuinticLeg
@@ -18,7 +17,7 @@ from space_robot_control.guidance.demand import MotionDemand, demand
 from space_robot_control.guidance.limits import check_piece
 from space_robot_control.guidance.mission import Mission, MissionSettings
 from space_robot_control.guidance.segments import HoldSegment, read_segments
-from space_robot_model.elementary.matrices import norms
+from space_robot_model.elementary.matrices import Array, norms
 from space_robot_model.hardware.base_actuators import BaseActuatorSettings
 from space_robot_model.robot import Robot
 from space_robot_model.robot.kinematics import tool_state
@@ -28,8 +27,6 @@ from space_robot_msgs_py.errors import InputError
 from space_robot_sim.environment.orbit import OrbitSettings
 
 from ..flight.mission_demand import MOTION, PieceDemand, SourceDemand, excess, mission_demand
-
-Array = NDArray[np.float64]
 
 POSTURES = 51
 """Postures of a segment at which singular values are computed."""

@@ -15,9 +15,8 @@ from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from space_robot_model.elementary.matrices import norms, product, unit_rows
+from space_robot_model.elementary.matrices import Array, norms, product, unit_rows
 from space_robot_model.hardware.base_actuators import WheelSettings
 from space_robot_model.robot import Robot
 from space_robot_model.robot.gears import motor_momentum
@@ -34,9 +33,6 @@ from .analysed_log import AnalysedLog
 from .described import NotDescribedError, flown_captures, flown_events, plant_settings
 from .external_torques import base_loads, body_axes, torque_about_centre
 from .series import Definition, TimeSeries, metrics, series
-
-Array = NDArray[np.float64]
-
 
 VELOCITIES = (
     "base_velocity",

@@ -11,8 +11,8 @@ from contextlib import suppress
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from space_robot_model.elementary.matrices import Array
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.config.validation import one_of
 from space_robot_msgs_py.errors import InputError
@@ -31,8 +31,6 @@ from .measure import column_definition, column_label
 from .momentum import Momentum, whole_momentum
 from .series import GROUPS, SeriesGroup
 from .tool_path import ToolPath, leads_tool
-
-Array = NDArray[np.float64]
 
 AXES = ("x", "y", "z")
 

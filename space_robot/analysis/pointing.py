@@ -12,9 +12,8 @@ measured ones and once with the desired ones. The base's position is free in thi
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from space_robot_model.elementary.matrices import dot_rows, norms, unit_rows
+from space_robot_model.elementary.matrices import Array, dot_rows, norms, unit_rows
 from space_robot_model.robot.placements import tool_pose
 from space_robot_msgs_py.bag.flight_log import BLOCK_TICKS
 
@@ -27,8 +26,6 @@ from .errors import (
     unit_quaternions,
 )
 from .series import Definition, TimeSeries, metrics, series
-
-Array = NDArray[np.float64]
 
 ARCSEC = np.pi / 180.0 / 3600.0
 """rad."""

@@ -168,7 +168,7 @@ def _recorded(reports: Mapping[str, Report]) -> Table:
             report["ticks"]
             if report["ticks"] == report["flight_ticks"]
             else f"{report['ticks']} of {report['flight_ticks']}",
-            JudgedCell("", *(("whole", "good") if _is_whole(report) else ("not whole", "bad"))),
+            JudgedCell.of(_is_whole(report), "whole", "not whole"),
         ]
         for name, report in reports.items()
     ]

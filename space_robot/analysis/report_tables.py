@@ -38,7 +38,7 @@ def rms_table(report: Report) -> Table:
     is_seen = any(f"navigation_{name}.rms" in metrics for name in names)
     second = "navigation_{}.rms" if is_seen else "{}.rms_eq64"
     columns = (
-        Column(is_label=True),
+        named(),
         Column("unit"),
         Column("RMS, mean\nof axes"),
         Column("naviga-\ntion RMS" if is_seen else "RMS, eq.\n(64)"),
@@ -65,7 +65,7 @@ def table_v_columns(metrics: Mapping[str, float]) -> list[str]:
 
 def metrics_table(report: Report) -> Table:
     """Tabulate what `rms_table` leaves out; below stands why a metric is missing."""
-    columns, in_rms_table = (Column(is_label=True), Column()), table_v_columns(report["metrics"])
+    columns, in_rms_table = (named(), Column()), table_v_columns(report["metrics"])
     shown = [
         name
         for name in shown_names([report])
@@ -93,7 +93,7 @@ def comparison_table(reports: Mapping[str, Report]) -> Table:
     flights.append(["time (s)", *(f"{r['from_s']:g} to {r['to_s']:g}" for r in each)])
     if any(report["ticks"] < report["flight_ticks"] for report in each):
         flights.append(["share analyzed", *(f"{r['ticks'] / r['flight_ticks']:.1%}" for r in each)])
-    columns = Column(is_label=True), *(Column(name) for name in reports)
+    columns = named(), *(Column(name) for name in reports)
     groups = _groups(each, shown_names(each))
     return Table(
         "", columns, [Group(flights, "flight"), *groups, *_demand_on_axes(each), *_recording(each)]
@@ -226,12 +226,8 @@ def sizing_table(report: Report) -> Table | None:
         for part, each in parts
         if part not in BASE_AXES
     ]
-    columns = (
-        Column(is_label=True),
-        Column("unit", is_label=True),
-        Column("asked", spec=".4g"),
-        *((Column("has"), Column("margin")) if requirements else ()),
-    )
+    columns = [named(), named("unit"), Column("asked", spec=".4g")]
+    columns += [Column("has"), Column("margin")] if requirements else []
     rows = [Group([row[: len(columns)] for row in g.rows], g.name) for g in groups]
     return Table(_title(sizing), columns, rows, _notes(report))
 
@@ -254,8 +250,8 @@ def _row(quantity: str, unit: str, asked: float, judged: dict[str, Any] | None) 
     if margin is not None and margin <= -MANY_TIMES:
         return quantity, unit, asked, has, JudgedCell("", f"{1.0 - margin:.3g} times", "bad")
     text = "" if margin is None else f"{100.0 * margin:+.0f} %"
-    verdict = ("has it", "good") if judged["is_met"] else ("lacks it", "bad")
-    return quantity, unit, asked, has, JudgedCell(text, *verdict)
+    verdict = JudgedCell.of(judged["is_met"], "has it", "lacks it", text)
+    return quantity, unit, asked, has, verdict
 
 
 def _title(sizing: dict[str, Any]) -> str:

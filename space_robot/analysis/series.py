@@ -14,15 +14,13 @@ from fnmatch import fnmatchcase
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from space_robot_model.elementary.matrices import norm, norms
+from space_robot_model.elementary.matrices import Array, norm, norms
 from space_robot_msgs_py.errors import InputError
 
 from .analysed_log import AnalysedLog
 from .errors import AxisIndex
 
-Array = NDArray[np.float64]
 PLACEHOLDER = re.compile(r"{(\w+)}")
 
 

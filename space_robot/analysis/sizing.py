@@ -11,9 +11,8 @@ from collections.abc import Iterator, Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from space_robot_model.elementary.matrices import product
+from space_robot_model.elementary.matrices import Array, product
 from space_robot_model.hardware.base_actuators import (
     BaseActuatorSettings,
     ThrusterSettings,
@@ -35,8 +34,6 @@ from .actuation import ROUNDING, wheel_motion
 from .analysed_log import AnalysedLog
 from .external_torques import body_axes
 from .series import Definition, metrics
-
-Array = NDArray[np.float64]
 
 
 class ActuatorSet(NamedTuple):
@@ -274,10 +271,8 @@ class BaseDemand:
 
     def _held_by_wheels(self, start: int, stop: int) -> Array:
         rows, wheels = self._log.rows(start, stop), self._wheels
-        held, axes = (
-            product(wheels.spin_momenta(rows.wheel_velocities), wheels.unit_axes),
-            body_axes(rows),
-        )
+        held = product(wheels.spin_momenta(rows.wheel_velocities), wheels.unit_axes)
+        axes = body_axes(rows)
         if start == 0:
             self._taken = to_inertial(axes[:, :, :1], held[:1].T)
         at_first = to_base(axes, np.broadcast_to(self._taken, (3, len(held)))).T

@@ -15,10 +15,9 @@ from contextlib import suppress
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
 from space_robot_control.guidance.mission import Mission
-from space_robot_model.elementary.matrices import norms, unit_rows
+from space_robot_model.elementary.matrices import Array, norms, unit_rows
 from space_robot_model.robot import Robot
 from space_robot_model.robot.momentum import Motion, robot_momentum
 from space_robot_model.robot.placements import tool_pose
@@ -30,8 +29,6 @@ from .described import flown_captures, flown_settings
 from .momentum import happens_in
 from .pointing import rotation_angle
 from .series import Definition, TimeSeries, series
-
-Array = NDArray[np.float64]
 
 Poses = tuple[Array, Array]
 """Orientations (N, 3, 3) and positions (N, 3), m, inertial axes."""

@@ -15,9 +15,8 @@ from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from space_robot_model.elementary.matrices import unit_rows
+from space_robot_model.elementary.matrices import Array, unit_rows
 from space_robot_model.robot import Robot
 from space_robot_model.robot.dynamics import free_inverse_dynamics, inverse_dynamics
 from space_robot_msgs_py.bag.flight_log import BLOCK_TICKS, FlightLog
@@ -27,8 +26,6 @@ from .analysed_log import AnalysedLog
 from .errors import AxisIndex, controls_base
 from .pointing import TABLE_V
 from .series import Definition, TimeSeries, metrics, series
-
-Array = NDArray[np.float64]
 
 CHATTER_FREQUENCY = 100.0
 """Hz; power above it is chatter."""

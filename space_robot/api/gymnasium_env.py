@@ -10,9 +10,10 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from space_robot_model.dynamics.attitude import attitude_error_into, rotate_back, rotation_matrix
+from space_robot_model.elementary.matrices import Array
 from space_robot_msgs_py.config.arguments import as_numbers, as_whole_number
 from space_robot_msgs_py.config.installation import install_command
 from space_robot_msgs_py.config.validation import short
@@ -28,7 +29,6 @@ except ImportError:
     raise ImportError(f"gymnasium is not installed: {install_command('gym')}") from None
 
 
-Array = NDArray[np.float64]
 ScenarioDraw = Callable[[np.random.Generator], Scenario]
 
 WORST_COST = 100.0

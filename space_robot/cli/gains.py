@@ -9,7 +9,7 @@ from typing import Any
 import click
 
 from .option_types import FiniteRange, names_in
-from .options import flight_options
+from .options import flight_options, folder_option
 
 WORDS = f"{__name__}.words"
 MASS_UNCERTAINTY = click.option(
@@ -147,14 +147,7 @@ class TypedCommand(click.Command):
     help="Without --law, inertia of the laws with time-delay estimation: a constant diagonal, or "
     "H_S of the nominal model.",
 )
-@click.option(
-    "-o",
-    "--output",
-    type=click.Path(path_type=Path, file_okay=False),
-    required=True,
-    metavar="DIR",
-    help="Folder of the set, for --gains.",
-)
+@folder_option("-o", "--output", required=True, help="Folder of the set, for --gains.")
 @click.pass_context
 def tune(
     context: click.Context,

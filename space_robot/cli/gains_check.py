@@ -6,13 +6,12 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
 from rich.console import Console
 
 from space_robot_control.controller.gains import available_laws
 from space_robot_control.laws import ControlLaw
 from space_robot_control.laws.base import NO_ESTIMATE, NOMINAL_INERTIA
+from space_robot_model.elementary.matrices import Array
 from space_robot_msgs_py.config.validation import validate
 from space_robot_msgs_py.errors import FlightError, InputError
 
@@ -24,8 +23,6 @@ from ..scenario.node_settings import FlightSettings
 from ..tuning.flexible import FlexibleMotions, check_flexible
 from ..tuning.gain_check import LEAST_MARGIN, GainCheck, Spectrum, check_gains, pair_corner
 from ..tuning.inertia import SAMPLING, inertia_along, postures_along, sampled_reference
-
-Array = NDArray[np.float64]
 
 ALL = "all"
 HELD = 6.0

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from .options import excerpt_options
+from .options import excerpt_options, file_option
 from .telemetry import PACKETS
 
 if TYPE_CHECKING:
@@ -27,9 +27,8 @@ if TYPE_CHECKING:
     show_default=True,
     help="Port at which telemetry is received.",
 )
-@click.option(
+@file_option(
     "--database",
-    type=click.Path(path_type=Path, dir_okay=False),
     help="XTCE file of the telemetry [default: that of the flight that sends to the port].",
 )
 @PACKETS

@@ -37,10 +37,10 @@ def _remap(context: click.Context, option: click.Parameter, texts: Any) -> dict[
     return remap
 
 
-def folder_option(name: str, help: str) -> Decorator:
+def folder_option(*names: str, help: str, **settings: Any) -> Decorator:
     """Make an option that names a folder to write to."""
     kind = click.Path(path_type=Path, file_okay=False)
-    return click.option(name, type=kind, metavar="DIR", help=help)
+    return click.option(*names, type=kind, metavar="DIR", help=help, **settings)
 
 
 def file_option(*names: str, help: str) -> Decorator:

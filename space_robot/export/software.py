@@ -30,8 +30,6 @@ from space_robot_msgs_py.samples import RobotState
 
 from ..flight.plan import Flight, Scenario, resolve
 
-Array = NDArray[np.float64]
-
 
 def exported_laws(flight: Flight, further: Sequence[str] = ()) -> list[ControlLaw]:
     """Return the laws of a flight: in force at the start, swapped to, and ``further`` ones.

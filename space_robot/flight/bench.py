@@ -13,7 +13,7 @@ import copy
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from space_robot_control.controller.controller import Controller, ControllerSnapshot
 from space_robot_msgs_py.bag.flight_log import FlightLog
@@ -30,8 +30,6 @@ from ..scenario.recorded import differences
 from .bench_log import BenchHistory, BenchLog, law_at
 from .ending import Ending
 from .plan import Flight
-
-Array = NDArray[np.float64]
 
 LARGEST_SEED = 2**31 - 1
 REFERENCE_TICKS = 1000

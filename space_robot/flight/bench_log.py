@@ -9,11 +9,11 @@ from itertools import islice
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from typing_extensions import Self
 
 from space_robot_control.controller.law_choice import LawChoice, NoLaw
 from space_robot_control.laws import ControlLaw
+from space_robot_model.elementary.matrices import Array
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.errors import DivergedError, FlightError
 from space_robot_msgs_py.samples import Command
@@ -21,8 +21,6 @@ from space_robot_msgs_py.samples import Command
 from .flown_log import ended_early, flight_log, note_assumed_errors
 from .plan import Flight
 from .simulate import measured_ticks
-
-Array = NDArray[np.float64]
 
 CHUNK_TICKS = 256
 """Ticks of a chunk; full chunks are shared by copies."""

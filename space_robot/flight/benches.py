@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from space_robot_model.elementary.matrices import Array
 from space_robot_msgs_py.compiled.lanes import WIDTH
 from space_robot_msgs_py.compiled.records import Block
 from space_robot_msgs_py.config.arguments import as_numbers, as_whole_number
@@ -30,8 +31,6 @@ from .ending import Ending
 from .lane_loop import InLanes, fly_benches, measure_lanes
 from .lane_memory import begin_tick, delay_buffers, fill
 from .plan import Flight
-
-Array = NDArray[np.float64]
 
 
 class Benches:

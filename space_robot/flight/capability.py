@@ -9,9 +9,8 @@ from itertools import combinations
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from space_robot_model.elementary.matrices import product, unit_rows
+from space_robot_model.elementary.matrices import Array, product, unit_rows
 from space_robot_model.hardware.base_actuators import (
     BaseActuatorSettings,
     ThrusterSettings,
@@ -19,8 +18,6 @@ from space_robot_model.hardware.base_actuators import (
 )
 from space_robot_model.robot.placements import to_base, to_inertial
 from space_robot_msgs_py.errors import InputError
-
-Array = NDArray[np.float64]
 
 BATCH = 8192
 """Ticks at a time; this bounds the memory."""

@@ -9,7 +9,6 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import numpy as np
-from numpy.typing import NDArray
 
 from space_robot_control.controller.law_choice import LawChoice
 from space_robot_control.controller.reference_buffer import ReferenceBuffer
@@ -36,7 +35,6 @@ from space_robot_sim.plant.messages import NO_TICK, CommandGuard, PlantMessages,
 from .flown_log import empty_log
 from .plan import Flight
 
-Array = NDArray[np.float64]
 Record = Callable[[topics.Topic, bytes], object]
 LARGE_BAG = 500e6
 """Bytes of a bag that a user is told before it is written."""

@@ -9,8 +9,8 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from space_robot_model.elementary.matrices import Array
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.bag.flight_log import FlightLog, block_bounds, of_nan
 from space_robot_msgs_py.errors import InputError
@@ -18,8 +18,6 @@ from space_robot_msgs_py.samples import ReferenceChunk
 from space_robot_msgs_py.wire.messages import TELEMETRY_ROWS
 
 from .plan import Flight
-
-Array = NDArray[np.float64]
 
 MAPPED_FROM = 2**30
 """Bytes from which on a log lies in files, which have no names and go with it."""

@@ -11,6 +11,7 @@ from space_robot_control.controller.signals import USABLE, compute_signals, copy
 from space_robot_control.controller.tick import apply_transfer
 from space_robot_control.laws.base import LawCode
 from space_robot_model.dynamics.rho_space import force_for
+from space_robot_model.elementary.matrices import Array
 from space_robot_msgs_py.compiled.kernels import RecordFunction, kernel
 from space_robot_msgs_py.compiled.lanes import (
     WIDTH,
@@ -25,8 +26,6 @@ from space_robot_msgs_py.compiled.records import Block
 from space_robot_sim.plant.lanes import advance_lanes, spread
 from space_robot_sim.plant.tick import RATE_LIMIT
 from space_robot_sim.sensors.sensors import sense
-
-Array = NDArray[np.float64]
 
 
 class InLanes(NamedTuple):

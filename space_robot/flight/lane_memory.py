@@ -12,6 +12,7 @@ from space_robot_control.controller.controller import Controller
 from space_robot_control.controller.signals import ControllerMemory
 from space_robot_control.laws import ControlLaw
 from space_robot_control.laws.base import CompiledLaw, LawCode, LawMemory, SomeGains
+from space_robot_model.elementary.matrices import Array
 from space_robot_msgs_py.compiled.lanes import WIDTH
 from space_robot_msgs_py.compiled.records import Block, Record, prefix
 from space_robot_msgs_py.samples import ALL_FIELDS, Reference, ReferenceChunk, State
@@ -21,8 +22,6 @@ from space_robot_sim.plant.tick import PlantMemory
 from .flown_log import allocate_columns, empty_log, new_array
 from .lane_loop import InLanes, LaneLog, LaneMemory, References, take_out
 from .plan import Flight
-
-Array = NDArray[np.float64]
 
 
 def record_numbers(block: Block) -> Array:

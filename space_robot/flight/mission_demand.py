@@ -11,12 +11,11 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from space_robot_control.guidance.courses import FEWEST_KNOTS, MOST_KNOTS, Piece, sample_times
 from space_robot_control.guidance.demand import MotionDemand, demand
 from space_robot_control.guidance.segments import Segment, ToolSegment, read_segments
-from space_robot_model.elementary.matrices import norms
+from space_robot_model.elementary.matrices import Array, norms
 from space_robot_model.hardware.base_actuators import BaseActuatorSettings
 from space_robot_model.orbit.ephemeris import AssumedOrbit, Ephemeris
 from space_robot_model.robot import Robot
@@ -33,8 +32,6 @@ from space_robot_sim.plant.tick import REPORT_TICKS, PlantMemory, update_true_st
 
 from ..scenario.resolved import ResolvedScenario
 from .capability import actuator_load, carried_momentum
-
-Array = NDArray[np.float64]
 
 MOST_SAMPLES = 200_000
 """Samples of all segments together, beside the fewest that each has."""

@@ -6,13 +6,13 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from space_robot_control.controller.controller import Controller, unusable
 from space_robot_control.controller.law_choice import LawChoice
 from space_robot_control.controller.signals import USABLE
 from space_robot_control.controller.tick import controller_tick
 from space_robot_control.laws.base import CompiledLaw, LawCode
+from space_robot_model.elementary.matrices import Array
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.bag.reader import read_flight
 from space_robot_msgs_py.compiled.kernels import RecordFunction, kernel
@@ -27,8 +27,6 @@ from .flight_messages import MessageLoop, Messages, recording
 from .flown_log import ended_early, flight_log, note_assumed_errors
 from .plan import Flight
 from .telemetry import live_telemetry, telemetry_of
-
-Array = NDArray[np.float64]
 
 STRETCH_TICKS, MESSAGE_STRETCH = 10_000, 1_000
 """Ticks flown between two reports of progress: in compiled code, message by message."""

@@ -5,13 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
+from space_robot_model.elementary.matrices import Array
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.samples import ALL_FIELDS
-
-Array = NDArray[np.float64]
 
 OF_THE_LAW = ("s", "u")
 """Telemetry that is in the memory of the law in force."""

@@ -6,9 +6,9 @@ Its kernels are compiled for one environment and for eight in lanes, with the sa
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from space_robot_model.dynamics.attitude import attitude_error_into
+from space_robot_model.elementary.matrices import Array
 from space_robot_model.elementary.normal import State as RandomState
 from space_robot_model.elementary.normal import following, unit_of
 from space_robot_msgs_py.compiled.kernels import kernel
@@ -23,8 +23,6 @@ from space_robot_sim.plant.tick import (
     end_interval,
     write_true_state,
 )
-
-Array = NDArray[np.float64]
 
 WORST_COST = 100.0
 """Cost per second that terminates an episode: that of a joint error of 10 rad."""

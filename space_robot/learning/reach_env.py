@@ -13,8 +13,9 @@ from inspect import signature
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from space_robot_model.elementary.matrices import Array
 from space_robot_msgs_py.compiled.lanes import WIDTH
 from space_robot_msgs_py.compiled.records import Block
 from space_robot_msgs_py.config.arguments import as_numbers, as_positive, as_whole_number
@@ -39,7 +40,6 @@ from ..flight.lane_memory import in_lanes, record_numbers
 from ..flight.plan import Flight
 from .reach import LARGEST, Reach, begin_episode, step_alone, step_in_lanes
 
-Array = NDArray[np.float64]
 Info = dict[str, Any]
 
 MOST_ENVS, MOST_THREADS = 1 << 18, 1024

@@ -32,7 +32,8 @@ from numpy.typing import NDArray
 from scipy.linalg import solve_continuous_are
 from scipy.optimize import brentq
 
-Array = NDArray[np.float64]
+from space_robot_model.elementary.matrices import Array
+
 ComplexArray = NDArray[np.complex128]
 
 B = np.array([[0.0], [1.0]])

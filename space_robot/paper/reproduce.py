@@ -21,7 +21,7 @@ from ..analysis.figures.base_torque import BaseTorque
 from ..analysis.figures.figure_set import FigureFolder, SavedFigure
 from ..analysis.report import template
 from ..console.files import csv_writer
-from ..console.tables import Column, JudgedCell, Table, as_markdown
+from ..console.tables import Column, JudgedCell, Table, as_markdown, named
 from ..flight.flown_log import empty_log
 from ..flight.plan import Flight, Scenario, resolve
 from ..processes.executor import run_all
@@ -109,11 +109,7 @@ def compare_with_table(results: Iterable[Result]) -> list[Cell]:
 
 def variant_tables(comparison: Sequence[Cell]) -> Iterator[Table]:
     """Tabulate each variant and definition."""
-    columns = (
-        Column("controller", is_label=True),
-        Column("case", is_label=True),
-        *(Column(*heading) for heading in HEADINGS.values()),
-    )
+    columns = named("controller"), named("case"), *(Column(*own) for own in HEADINGS.values())
     for definition, meaning in DEFINITIONS.items():
         for variant in VARIANTS:
             rows: dict[tuple[str, str], list[str]] = {}
@@ -129,8 +125,7 @@ def chatter_table(flights: Iterable[dict[str, Any]]) -> Table:
     """Tabulate the chatter of flights, as `reproduce` returns it."""
     names = ("base", "joints 1-3", "joints 4-6")
     columns = (
-        Column("controller", is_label=True),
-        Column("gains", is_label=True),
+        *map(named, ("controller", "gains")),
         *(Column(f"{name}: variation", "N m/s", ".3g") for name in names),
         *(Column(f"{name}: power > 100 Hz", spec=".1e") for name in names),
     )
@@ -158,15 +153,14 @@ class Claim(NamedTuple):
 
 def claims_table(records: Iterable[dict[str, Any]]) -> Table:
     """Tabulate claims, as `reproduce` returns them, each with its verdict."""
-    columns = (
-        Column("claim", is_label=True),
-        Column("measured", spec=".4g"),
-        Column("limit"),
-        Column(is_label=True),
-    )
-    verdicts = {True: JudgedCell("", "holds", "good"), False: JudgedCell("", "fails", "bad")}
+    columns = named("claim"), Column("measured", spec=".4g"), Column("limit"), named()
     rows = [
-        [c["text"], c["value"], f"{c['relation']} {c['limit']:g}", verdicts[c["holds"]]]
+        [
+            c["text"],
+            c["value"],
+            f"{c['relation']} {c['limit']:g}",
+            JudgedCell.of(c["holds"], "holds", "fails"),
+        ]
         for c in records
     ]
     return Table.of("", columns, rows)

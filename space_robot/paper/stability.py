@@ -34,6 +34,7 @@ from space_robot.analysis.errors import neglected_force
 from space_robot_control.laws import laws
 from space_robot_model.dynamics.attitude import attitude_error_into
 from space_robot_model.dynamics.rho_space import RhoSpaceModel, rho_space_into
+from space_robot_model.elementary.matrices import Array
 from space_robot_model.robot import Robot
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.errors import InputError
@@ -42,7 +43,6 @@ from ..flight.plan import NO_FRICTION, Flight, Scenario, resolve
 from ..tuning.gain_check import contraction_matrix
 from .lyapunov import Certificate, certify, largest_tolerated_beta, paper_m, peak_gain, residual
 
-Array = NDArray[np.float64]
 Fly = Callable[[Flight, str], FlightLog]
 """Flies a checked plan; the text names the flight of the study."""
 

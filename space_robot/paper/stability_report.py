@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from rich.console import Console
 
-from ..console.tables import Column, JudgedCell, Table, Value
+from ..console.tables import Column, JudgedCell, Table, Value, named
 from ..console.terminal import print_table, say
 from .lyapunov import Certificate
 from .stability import (
@@ -130,7 +130,7 @@ def _lemma_1(study: StabilityStudy) -> Table:
         for name, x in norms.items()
     ]
     heads = {"min": ".4f", "max": ".4f", "at t (s)": ".2f", "below 1": ""}
-    columns = [Column(is_label=True), *(Column(head, "", spec) for head, spec in heads.items())]
+    columns = [named(), *(Column(head, "", spec) for head, spec in heads.items())]
     return Table.of("Lemma 1: W = E - H_S^-1 H̄ (69)", columns, rows)
 
 
@@ -178,7 +178,7 @@ def _by_axis(
 ) -> Table:
     heads, cells = zip(*columns, strict=True)
     rows = list(zip(names, *cells, strict=True))
-    return Table.of(title, [Column(is_label=True), *map(Column, heads)], rows)
+    return Table.of(title, [named(), *map(Column, heads)], rows)
 
 
 def _each(certificates: Iterable[Certificate | None], name: str) -> list[str]:

@@ -8,7 +8,7 @@ imported, not even Pydantic, so that ``--help`` is quick.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any, Literal, get_args, get_origin, get_type_hints
 
 
@@ -63,6 +63,10 @@ class Option:
 
 
 option: Any = Option  # a field has the type of its value, not this one
+of_controller: Any = partial(Option, node="controller", sets="controller")
+of_graph: Any = partial(Option, needs_graph=True)
+of_command: Any = partial(of_graph, is_launched=False)
+"""Of a graph that `fly` starts: the launch file has no such argument."""
 
 
 class Options:
@@ -139,12 +143,10 @@ class Options:
         metavar="SIZE",
         sets="recorder",
     )
-    navigation: Literal["direct", "filtered"] | None = option(
+    navigation: Literal["direct", "filtered"] | None = of_controller(
         "What the laws see: the measurements, or the navigation filter's estimates",
         None,
         default_text="direct",
-        node="controller",
-        sets="controller",
     )
     command_latency_ticks: int = option("Ticks by which the plant applies commands late", 0)
     friction: bool = option("Joint friction of the case, or none", True)
@@ -168,99 +170,69 @@ class Options:
         sets="plant",
     )
     seed: int = option("Seed of the random numbers of faults and sensors", 0, low=0)
-    controller_code: str = option(
+    controller_code: str = of_controller(
         "What answers as the controller: its kernels compiled here (python), the same as C, "
         "built by the system's compiler (c), or a flight computer at udp:HOST:PORT",
         "python",
         metavar="CODE",
-        node="controller",
-        sets="controller",
     )
-    shadow: Literal["none", "c"] = option(
+    shadow: Literal["none", "c"] = of_controller(
         "Let the C code answer, too, and end the flight with exit code 1 at the first number "
         "that differs",
         "none",
-        node="controller",
-        sets="controller",
     )
-    telemetry: str = option(
+    telemetry: str = of_controller(
         "Send telemetry as CCSDS packets to udp:HOST:PORT, or write them to a file",
         "",
         default_text="none",
         metavar="DESTINATION",
-        node="controller",
-        sets="controller",
     )
-    telemetry_packets: str = option(
+    telemetry_packets: str = of_controller(
         "Packets of the telemetry: {names}, or a path to a YAML file",
         "housekeeping",
         folder="telemetry",
-        node="controller",
-        sets="controller",
     )
-    telecommands: str = option(
+    telecommands: str = of_command(
         "Take telecommands, CCSDS packets, at udp:127.0.0.1:PORT",
         "",
         default_text="none",
         metavar="ADDRESS",
-        needs_graph=True,
-        is_launched=False,
     )
-    realtime: bool = option("Pace by the wall clock instead of lockstep", False, needs_graph=True)
-    paused: bool = option(
-        "Begin paused: `space-robot sim` resumes the plant, or steps it",
-        False,
-        needs_graph=True,
-        sets="plant",
+    realtime: bool = of_graph("Pace by the wall clock instead of lockstep", False)
+    paused: bool = of_graph(
+        "Begin paused: `space-robot sim` resumes the plant, or steps it", False, sets="plant"
     )
-    fifo_priority: int = option(
+    fifo_priority: int = of_graph(
         "Ask for SCHED_FIFO for plant and controller; for machines with cores to spare",
         0,
-        needs_graph=True,
         low=0,
         high=98,
     )
-    namespace: str = option(
+    namespace: str = of_graph(
         "ROS namespace of the nodes and their topics, as /sat1: one for each robot in a domain",
         "/",
         metavar="NS",
-        needs_graph=True,
     )
-    composed: bool = option(
-        "Run all nodes in one process: faster, and no node can be killed or stopped alone",
-        False,
-        needs_graph=True,
-        is_launched=False,
+    composed: bool = of_command(
+        "Run all nodes in one process: faster, and no node can be killed or stopped alone", False
     )
-    without: list[Literal["controller", "mission"]] = option(
+    without: list[Literal["controller", "mission"]] = of_graph(
         "Do not start this node, controller or mission: the flight waits for one of your own; "
         "may be repeated",
         [],
         metavar="NODE",
-        needs_graph=True,
     )
-    join_timeout: float = option(
+    join_timeout: float = of_graph(
         "Longest wait for the nodes of --without, s of the wall clock (0: no limit)",
         60.0,
-        needs_graph=True,
         low=0.0,
         high=1e6,
     )
-    restart_controller: bool = option(
-        "Restart a controller that died or hangs",
-        False,
-        needs_graph=True,
-        is_launched=False,
-        node="controller",
+    restart_controller: bool = of_command(
+        "Restart a controller that died or hangs", False, node="controller"
     )
-    domain: int | None = option(
-        "ROS domain",
-        None,
-        default_text="ROS_DOMAIN_ID, or a free one",
-        needs_graph=True,
-        is_launched=False,
-        low=0,
-        high=232,
+    domain: int | None = of_command(
+        "ROS domain", None, default_text="ROS_DOMAIN_ID, or a free one", low=0, high=232
     )
     parameters: dict[str, dict[str, Any]] = {}  # noqa: RUF012 - Pydantic copies it
     """Further parameters by node, dotted names."""

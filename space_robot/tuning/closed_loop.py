@@ -19,12 +19,11 @@ from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+
+from space_robot_model.elementary.matrices import Array
 
 from .inertia import Posture
 from .linear_law import LinearLaw
-
-Array = NDArray[np.float64]
 
 SLOWEST_GROWTH = 1e-6
 """Growth in a tick up to which a loop counts as stable: that of rounding errors."""

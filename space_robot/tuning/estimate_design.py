@@ -7,15 +7,13 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from space_robot_model.elementary.matrices import Array
 from space_robot_msgs_py.errors import InputError
 
 from .closed_loop import bisect
 from .gain_check import eigenvalues
 from .task import CONSTANT, MOST_PER_TICK, NOMINAL, SEPARATION, Noise, TuningTask
-
-Array = NDArray[np.float64]
 
 K_1_FACTOR = 2.2
 """K_1 of the super-twisting term by the square root of W eps, see step 6 of `method`."""

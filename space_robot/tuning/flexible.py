@@ -20,14 +20,13 @@ from numpy.typing import NDArray
 from space_robot_control.laws import ControlLaw
 from space_robot_control.laws.base import NO_ESTIMATE
 from space_robot_control.navigation.rate_filters import low_pass_weight
+from space_robot_model.elementary.matrices import Array
 from space_robot_model.robot import Robot
 from space_robot_model.robot.gears import FlexibleModel, flexible_model, geared_joints
 
 from .closed_loop import SLOWEST_GROWTH, SmallMotion, bisect, linear_loop
 from .inertia import J0, Posture, inertia_in_rho, postures_at
 from .linear_law import LinearLaw, linear_laws
-
-Array = NDArray[np.float64]
 
 RIGID = 0.5
 """Share of the slowest spring's rate below which a mode is one of the rigid robot."""

@@ -51,19 +51,17 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from space_robot_control.controller.settings import ControllerNodeSettings
 from space_robot_control.laws import ControlLaw
 from space_robot_control.laws.base import CONSTANT_INERTIA, NO_ESTIMATE
 from space_robot_control.navigation.rate_filters import low_pass_weight
+from space_robot_model.elementary.matrices import Array
 
 from .closed_loop import SLOWEST_GROWTH, RigidLoop
 from .flexible import FlexibleCheck
 from .inertia import J0, Posture
 from .linear_law import linear_laws
-
-Array = NDArray[np.float64]
 
 LOOPS = 31
 """Largest number of postures in which the loop is closed."""

@@ -5,16 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from space_robot_control.controller.gains import NOMINAL_H_BAR as IN_FILES
 from space_robot_control.controller.settings import SET_FILE
+from space_robot_model.elementary.matrices import Array
 
 from .law_gains import TunedLaw
 from .method import Tuned
 from .task import NOMINAL
-
-Array = NDArray[np.float64]
 
 NOTES = {
     "ctc": "(31): K_P = W^2, K_D = 2 W.",

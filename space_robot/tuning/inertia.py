@@ -23,15 +23,13 @@ from collections.abc import Iterable
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from space_robot_control.guidance.courses import FEWEST_KNOTS
 from space_robot_control.guidance.mission import Mission, MissionSettings
+from space_robot_model.elementary.matrices import Array
 from space_robot_model.robot import Robot
 from space_robot_model.robot.placements import BodyFrame, body_frames
 from space_robot_msgs_py.samples import ReferenceChunk
-
-Array = NDArray[np.float64]
 
 SAMPLING = 0.05
 """Time between two evaluated configurations, s; a leg of a mission takes seconds."""

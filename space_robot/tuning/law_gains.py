@@ -6,17 +6,15 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from space_robot_control.laws import find_law
+from space_robot_model.elementary.matrices import Array
 
 from .closed_loop import RigidLoop, linear_loop, rigid_motion
 from .estimate_design import K_1_FACTOR, EstimateDesign
 from .gain_check import eigenvalues
 from .linear_law import linear_law
 from .task import SEPARATION, TuningTask
-
-Array = NDArray[np.float64]
 
 MOST_WEIGHT = 0.9
 """Largest weight of an observer's low-pass: that of 1 has no finite bandwidth."""

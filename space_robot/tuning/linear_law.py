@@ -24,12 +24,11 @@ from numpy.typing import NDArray
 
 from space_robot_control.laws import CompiledLaw, ControlLaw, Signals
 from space_robot_control.laws.base import CONSTANT_INERTIA, NOMINAL_INERTIA, LawError, force_of
+from space_robot_model.elementary.matrices import Array
 from space_robot_msgs_py.compiled.records import Block, assign
 from space_robot_msgs_py.config.text import one_line_of
 
 from .inertia import J0, Posture
-
-Array = NDArray[np.float64]
 
 
 class LinearLaw(NamedTuple):

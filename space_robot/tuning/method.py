@@ -45,9 +45,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from space_robot_control.laws import laws
+from space_robot_model.elementary.matrices import Array
 
 from .estimate_design import (
     EstimateDesign,
@@ -68,8 +68,6 @@ from .law_gains import (
     tune_indi,
 )
 from .task import NOMINAL, ForceDemand, Noise, TuningOptions, TuningTask, axis_inertia
-
-Array = NDArray[np.float64]
 
 DIGITS = 3
 """Significant digits of a gain: few enough to be equal on all machines."""

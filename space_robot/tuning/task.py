@@ -13,7 +13,6 @@ from dataclasses import astuple, dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from space_robot_control.controller.controller import Controller
 from space_robot_control.guidance.mission import Mission, MissionSettings
@@ -21,6 +20,7 @@ from space_robot_control.laws import find_law
 from space_robot_control.navigation.settings import NavigationFilterSettings
 from space_robot_model.dynamics.attitude import rotation_matrix
 from space_robot_model.dynamics.rho_space import RhoSpaceModel, rho_space_into
+from space_robot_model.elementary.matrices import Array
 from space_robot_model.robot import Robot
 from space_robot_msgs_py.samples import Command
 from space_robot_sim.component import Installation
@@ -36,8 +36,6 @@ from space_robot_sim.plant.settings import PlantSettings
 
 from .gain_check import eigenvalues
 from .inertia import J0, SAMPLING, Posture, sampled_reference
-
-Array = NDArray[np.float64]
 
 CONSTANT, NOMINAL = "constant", "nominal"
 """Inertia of the laws with time-delay estimation: see `TuningOptions`."""

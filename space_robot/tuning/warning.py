@@ -6,7 +6,6 @@ import math
 from collections.abc import Iterable, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from space_robot_control.guidance.courses import Piece
 from space_robot_control.guidance.limits import ROUNDING, turn_remarks
@@ -14,6 +13,7 @@ from space_robot_control.guidance.mission import MissionSettings
 from space_robot_control.laws import CompiledLaw, ControlLaw
 from space_robot_control.laws.base import CONSTANT_INERTIA, NO_ESTIMATE
 from space_robot_control.navigation.rate_filters import low_pass_weight
+from space_robot_model.elementary.matrices import Array
 from space_robot_model.robot import Robot
 from space_robot_msgs_py.errors import InputError
 
@@ -21,8 +21,6 @@ from .closed_loop import RigidLoop
 from .gain_check import LEAST_MARGIN, estimate_spectrum
 from .inertia import Posture, inertia_along, postures_along, semi_floating_inertia
 from .linear_law import linear_law
-
-Array = NDArray[np.float64]
 
 FEW = 8
 """Configurations in which the loop of an observer is closed."""

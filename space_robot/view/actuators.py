@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from space_robot_model.elementary.matrices import Array
 from space_robot_model.hardware.base_actuators import BaseActuatorSettings, WheelSettings
 from space_robot_model.robot import Robot
 from space_robot_msgs_py.bag.flight_log import FlightLog
@@ -26,7 +27,6 @@ from .shapes import BaseSurface
 if TYPE_CHECKING:
     from viser import GlbHandle, MeshHandle, SceneApi
 
-Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 FASTEST = 4.0

@@ -7,9 +7,9 @@ from itertools import pairwise
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from space_robot_model.elementary.matrices import Array
 from space_robot_model.robot import Robot
 from space_robot_msgs_py.bag.flight_log import FlightLog
 
@@ -25,8 +25,6 @@ from .targets import add_targets
 
 if TYPE_CHECKING:
     from viser import LineSegmentsHandle, SceneApi, ViserServer
-
-Array = NDArray[np.float64]
 
 POSES = 12
 """Number of poses of a flight from which the side of the initial camera is chosen."""

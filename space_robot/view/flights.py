@@ -11,8 +11,8 @@ from itertools import cycle, pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from space_robot_model.elementary.matrices import Array
 from space_robot_model.robot import Robot
 from space_robot_model.robot.find import find_robot, robot_as_path
 from space_robot_model.robot.parts import Spring
@@ -33,8 +33,6 @@ from .frames import RATE_HZ, shown_times
 from .orbit import arrow_colours, is_in_orbit, shadow_intervals, sun_direction
 from .scene import palette
 from .shapes import shown_shapes
-
-Array = NDArray[np.float64]
 
 STRETCHES = 400
 """Time intervals of a flight; minimum and maximum of each are drawn, so that chatter is visible."""

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from space_robot_model.elementary.matrices import unit_rows
+from space_robot_model.elementary.matrices import Array, unit_rows
 from space_robot_model.robot import Robot
 from space_robot_model.robot.placements import Transform, joint_transforms, tool_pose
 from space_robot_msgs_py.bag.flight_log import FlightLog
@@ -16,7 +16,6 @@ from space_robot_msgs_py.errors import InputError
 
 from ..analysis.errors import controls_base
 
-Array = NDArray[np.float64]
 RowIndices = NDArray[np.intp]
 Move = Callable[[int], None]
 """Updates a part of a scene to the k-th frame; called for k = 0, 1, ..."""

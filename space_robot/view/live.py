@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from space_robot_model.elementary.matrices import unit_rows
+from space_robot_model.elementary.matrices import Array, unit_rows
 from space_robot_model.hardware.base_actuators import BaseActuatorSettings
 from space_robot_model.robot import Robot
 from space_robot_model.robot.placements import joint_transforms, tool_pose
@@ -40,8 +40,6 @@ from .stage import clearest_side, set_stage
 
 if TYPE_CHECKING:
     from viser import ViserServer
-
-Array = NDArray[np.float64]
 
 RATE_HZ, PANEL_EVERY, ROWS = 30, 6, 300
 """Frames a second, frames between updates of texts and curves, and rows of the log: ten seconds."""

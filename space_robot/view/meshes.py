@@ -10,7 +10,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from space_robot_model.elementary.matrices import Array
+
 Indices = NDArray[np.int64]
 
 FOIL_CELLS, CREASE, FOIL_SEED = 9, 0.012, 1

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from space_robot_model.elementary.matrices import unit_rows
+from space_robot_model.elementary.matrices import Array, unit_rows
 from space_robot_model.orbit.elements import EARTH_RADIUS
 from space_robot_model.robot import Robot
 from space_robot_msgs_py.bag.flight_log import FlightLog
@@ -27,7 +27,6 @@ from .shapes import base_reach
 if TYPE_CHECKING:
     from viser import SceneApi
 
-Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 Indices = NDArray[np.int64]
 Tints = tuple[tuple[int, int, int], tuple[int, int, int]]

@@ -8,9 +8,8 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from space_robot_model.elementary.matrices import unit_rows
+from space_robot_model.elementary.matrices import Array, unit_rows
 from space_robot_model.elementary.rotations import quaternion_of_rotation
 from space_robot_model.robot import Robot
 from space_robot_model.robot.parts import Colour, Visual
@@ -28,7 +27,6 @@ from .shapes import drawn_parts, shown_shapes
 if TYPE_CHECKING:
     from viser import FrameHandle, SceneApi, SceneNodeHandle, ViserServer
 
-Array = NDArray[np.float64]
 RGB = tuple[int, int, int]
 
 AXES = 0.08

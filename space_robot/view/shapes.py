@@ -14,8 +14,8 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from space_robot_model.elementary.matrices import Array
 from space_robot_model.robot import Robot
 from space_robot_model.robot.parts import Colour, Plate, Visual
 from space_robot_model.robot.placements import base_axes, body_frames
@@ -28,8 +28,6 @@ from space_robot_model.robot.shapes import (
 )
 
 from .meshes import Mesh, foil, frame, mesh_arrays, panel
-
-Array = NDArray[np.float64]
 
 MOST_FACES = 60_000
 """Maximum number of faces of all meshes of a robot: about 0.7 MB of a page."""

@@ -7,10 +7,9 @@ from importlib.util import find_spec
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from space_robot_model.elementary.matrices import unit_rows
+from space_robot_model.elementary.matrices import Array, unit_rows
 from space_robot_model.elementary.rotations import quaternion_of_rotation
 from space_robot_model.robot import Robot
 from space_robot_model.robot.placements import base_axes, body_frames
@@ -22,8 +21,6 @@ from .shapes import BaseSurface, bounding_boxes
 
 if TYPE_CHECKING:
     from viser import DirectionalLightHandle, SceneApi, ViserServer
-
-Array = NDArray[np.float64]
 
 FIELD_OF_VIEW = np.radians(35.0)
 DIRECTION = np.array([0.62, -1.0, 0.42])

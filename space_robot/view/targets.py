@@ -8,11 +8,10 @@ from itertools import pairwise
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
-from space_robot_model.elementary.matrices import unit_rows
+from space_robot_model.elementary.matrices import Array, unit_rows
 from space_robot_model.robot import Robot
 from space_robot_model.robot.placements import base_axes, body_frames
 from space_robot_model.robot.shapes import even_box
@@ -31,8 +30,6 @@ from .shapes import TARGET_COLOUR
 
 if TYPE_CHECKING:
     from viser import SceneApi
-
-Array = NDArray[np.float64]
 
 ACCURACY = 1e-9
 """Relative tolerance of the attitude's integration."""

@@ -18,6 +18,7 @@ from typing import NamedTuple
 from zipfile import ZipFile
 
 import pytest
+from command import run_program
 from conftest import TOOLS
 from flights import ros_environment
 from import_graph import PACKAGES
@@ -84,7 +85,7 @@ def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
         else:
             shutil.copy2(ROOT / name, source / name)
     command = [sys.executable, "-m", "build", "--no-isolation", "--outdir", str(source / "dist")]
-    done = subprocess.run(command, cwd=source, capture_output=True, text=True, check=False)
+    done = run_program(command, cwd=source)
     assert done.returncode == 0, done.stdout[-3000:] + done.stderr[-3000:]
     (built,) = (source / "dist").glob("*.whl")
     return built
@@ -196,9 +197,7 @@ def test_make_fly_flies_and_prints_the_table(free_domain: int, tmp_path: Path) -
     pytest.importorskip("rclpy")
     options = f"--duration 0.2 --domain {free_domain} --bag {tmp_path / 'bag'}"
     command = ["make", "-o", f"{sys.prefix}/.flies", "fly", f"VENV={sys.prefix}", f"ARGS={options}"]
-    made = subprocess.run(
-        command, cwd=ROOT, env=ros_environment(), capture_output=True, text=True, check=False
-    )
+    made = run_program(command, cwd=ROOT, env=ros_environment())
     assert made.returncode == 0, made.stderr
     assert "tde_stc, case 1, gains default: 400 ticks, 0.2 s" in made.stdout
     assert "messages lost: none" in made.stdout
@@ -223,14 +222,7 @@ def test_all_modules_are_collected_without_ros_and_the_tools_of_tests(tmp_path: 
         "PYTHONPATH": os.pathsep.join([str(tmp_path), str(ROOT)]),
         "PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1",
     }
-    done = subprocess.run(
-        [sys.executable, *command.split()],
-        cwd=ROOT,
-        text=True,
-        capture_output=True,
-        check=False,
-        env=environment,
-    )
+    done = run_program([sys.executable, *command.split()], cwd=ROOT, env=environment)
     assert done.returncode == 0, done.stdout[-2000:]
     skipped = done.stdout.partition("short test summary")[2]
     assert "hypothesis is not installed" in skipped

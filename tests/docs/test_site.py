@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import re
-import subprocess
 import sys
 from collections import Counter
 from collections.abc import Iterator
@@ -13,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from command import run_program
 from paths import DOCS, ROOT
 
 MarkdownIt = pytest.importorskip("markdown_it").MarkdownIt
@@ -68,13 +68,9 @@ class Elements(HTMLParser):
 @pytest.fixture(scope="module")
 def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("site")
-    made = subprocess.run(
-        [sys.executable, "-m", "mkdocs", "build", "--strict", "--site-dir", str(folder)],
-        cwd=ROOT,
-        text=True,
-        capture_output=True,
-        env={**os.environ, "NO_MKDOCS_2_WARNING": "1", "GALLERY_S": "0.2"},
-    )
+    command = [sys.executable, "-m", "mkdocs", "build", "--strict", "--site-dir", str(folder)]
+    environment = {**os.environ, "NO_MKDOCS_2_WARNING": "1", "GALLERY_S": "0.2"}
+    made = run_program(command, cwd=ROOT, env=environment)
     said = made.stdout + made.stderr
     assert made.returncode == 0, said
     assert not re.findall(r"WARN.*|ERROR.*", said), said

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import os
 import pickle
-import subprocess
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -14,6 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 import yaml
+from command import run_program
 from cpu_device import CpuDevice
 from exported_kernels import needs_compiler
 from flights import space_robot_here
@@ -113,9 +113,7 @@ def test_the_bits_are_those_of_before(plan: Planned, flown: Get) -> None:
 def test_they_are_those_of_a_processor_that_lacks_most() -> None:
     """In a process that is told so: sines, sums and products come from other code there."""
     command = [sys.executable, str(HERE), *MASKED]
-    ran = subprocess.run(
-        command, capture_output=True, text=True, check=False, env={**os.environ, **MASK}
-    )
+    ran = run_program(command, env={**os.environ, **MASK})
     assert ran.returncode == 0, ran.stdout + ran.stderr
     assert ran.stdout.splitlines() == [f"{name}: as stored" for name in MASKED]
 

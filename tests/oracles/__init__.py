@@ -10,17 +10,16 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 from strategies import BASE, State
 
+from space_robot_model.elementary.matrices import Array
 from space_robot_model.robot import Robot
 from space_robot_model.robot.dynamics import bias_force, forward_dynamics, mass_matrix
 from space_robot_model.robot.parts import Base, Body, RobotTree
 from space_robot_msgs_py.compiled.records import Block
 from space_robot_msgs_py.samples import Reference
-
-Array = NDArray[np.float64]
 
 
 def assert_close(actual: ArrayLike, expected: ArrayLike, tolerance: float) -> None:

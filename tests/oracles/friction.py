@@ -6,15 +6,13 @@ import itertools
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 from strategies import State
 
 from oracles import pinocchio_bias_force, pinocchio_mass_matrix, rotation_of
 from oracles.rotors import RotorEquations
+from space_robot_model.elementary.matrices import Array
 from space_robot_model.robot import Robot
-
-Array = NDArray[np.float64]
 
 
 def solutions(robot: Robot, state: State, torque: Array, coulomb: float) -> list[Array]:

@@ -8,15 +8,14 @@ from __future__ import annotations
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 from strategies import State
 
 from oracles import pinocchio_model, pinocchio_state, rotation_of, visited
+from space_robot_model.elementary.matrices import Array
 from space_robot_model.hardware.base_actuators import WheelSettings
 from space_robot_model.robot import Robot
 from space_robot_msgs_py.samples import RobotState
 
-Array = NDArray[np.float64]
 NO_WHEELS = WheelSettings()
 
 

@@ -15,10 +15,10 @@ from scipy.integrate import solve_ivp
 
 from oracles import pinocchio_model, pinocchio_state, visited
 from oracles.momenta import state_of
+from space_robot_model.elementary.matrices import Array
 from space_robot_model.robot import Robot
 from space_robot_msgs_py.samples import RobotState
 
-Array = NDArray[np.float64]
 Exact = NDArray[np.object_]
 """A vector of many digits."""
 

@@ -11,7 +11,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 from strategies import State
 
@@ -22,13 +21,13 @@ from oracles import (
     to_base_axes,
     visited,
 )
+from space_robot_model.elementary.matrices import Array
 from space_robot_model.hardware.base_actuators import WheelSettings
 from space_robot_model.robot import Robot
 from space_robot_model.robot.gears import geared_joints
 from space_robot_model.robot.parts import Gear
 from space_robot_msgs_py.compiled.records import assign
 
-Array = NDArray[np.float64]
 Forces = Callable[[float, Array], Array]
 """Generalised force (N+6+G,) on inertial axes at a time and state."""
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from oracles import attitude_jacobian_inertial, rotation_of, skew
 from space_robot_model.dynamics.regressor import (
@@ -13,9 +13,8 @@ from space_robot_model.dynamics.regressor import (
     mass_coordinates_into,
     second_moments_into,
 )
+from space_robot_model.elementary.matrices import Array
 from space_robot_model.robot import Robot
-
-Array = NDArray[np.float64]
 
 
 def frames(robot: Robot, quaternion: Array, theta: Array) -> tuple[Array, Array]:

@@ -13,6 +13,7 @@ from matplotlib.figure import Figure, FigureBase
 from numpy.typing import NDArray
 from typing_extensions import Self
 
+from space_robot_model.elementary.matrices import Array
 from space_robot_msgs_py.bag.flight_log import FlightLog
 
 from ..errors import junction_ticks
@@ -31,8 +32,6 @@ from .style import (
     plot_lines,
     plot_spectrum,
 )
-
-Array = NDArray[np.float64]
 
 CHATTER_STRETCH = 0.05
 """Time interval of base torque shown tick by tick, s."""

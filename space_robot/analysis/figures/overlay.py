@@ -9,9 +9,9 @@ from typing import NamedTuple
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 from typing_extensions import Self
 
+from space_robot_model.elementary.matrices import Array
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.errors import InputError
 
@@ -36,8 +36,6 @@ from .style import (
     plot_spectrum,
     total_variation,
 )
-
-Array = NDArray[np.float64]
 
 DRAWN = ("attitude", "joints", "pointing", "tool", "base", "torques")
 """Kinds of quantities whose sizes are drawn over time."""

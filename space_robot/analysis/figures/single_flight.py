@@ -10,8 +10,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.gridspec import SubplotSpec
 from matplotlib.ticker import MaxNLocator
-from numpy.typing import NDArray
 
+from space_robot_model.elementary.matrices import Array
 from space_robot_model.robot import Robot
 from space_robot_msgs_py.bag.flight_log import FlightLog
 
@@ -36,8 +36,6 @@ from .style import (
     plot_lines,
     save_figure,
 )
-
-Array = NDArray[np.float64]
 
 BASE_AXES = ("base x", "base y", "base z")
 JUNCTION_HALF_WIDTH = 0.15

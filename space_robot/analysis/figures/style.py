@@ -28,13 +28,13 @@ from matplotlib.legend import Legend
 from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
+from space_robot_model.elementary.matrices import Array
 from space_robot_msgs_py.config.text import shortened
 from space_robot_msgs_py.config.validation import one_of, short
 from space_robot_msgs_py.errors import InputError
 
 from ...console.files import atomic_file, make_folder
 
-Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
 MOST_LETTERS = 40

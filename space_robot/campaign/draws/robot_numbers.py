@@ -8,11 +8,11 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from space_robot_model.elementary.functions import exp
 from space_robot_model.elementary.linear_algebra import principal_axes
-from space_robot_model.elementary.matrices import product, rotate_tensor
+from space_robot_model.elementary.matrices import Array, product, rotate_tensor
 from space_robot_model.robot import Robot
 from space_robot_model.robot.parts import Plate
 from space_robot_model.robot.shapes import plates_of
@@ -21,7 +21,6 @@ from space_robot_msgs_py.errors import InputError
 
 from .paths import Elements, Path, Unavailable, value_at
 
-Array = NDArray[np.float64]
 XYZ = ("x", "y", "z")
 LOG_FACTORS = tuple(f"scale_{number}" for number in (1, 2, 3))
 """Logarithms of the factors of an inertia's second moments, in ascending order of these."""

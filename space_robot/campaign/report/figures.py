@@ -14,7 +14,8 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.ticker import LogFormatterSciNotation, LogLocator, NullFormatter
-from numpy.typing import NDArray
+
+from space_robot_model.elementary.matrices import Array
 
 from ...analysis.figures.figure_set import Drawing
 from ...analysis.figures.style import (
@@ -35,8 +36,6 @@ from .findings import Findings, Quantity
 
 if TYPE_CHECKING:
     from pandas import DataFrame
-
-Array = NDArray[np.float64]
 
 SHARES = (0.05, 0.5, 0.95)
 MOST_PANELS = 12
@@ -124,17 +123,14 @@ def grid_figure(
         for place, point in enumerate(points):
             for law in laws_in(point.table):
                 index = laws.index(law)
-                style, shift = (
-                    LineStyle.of(index),
-                    0.7 / len(laws) * (index - 0.5 * (len(laws) - 1)),
-                )
+                shift = 0.7 / len(laws) * (index - 0.5 * (len(laws) - 1))
                 values = penalised(law_rows(point.table, law), metric.column)
                 low, middle, high = np.quantile(values, SHARES, method="inverted_cdf").tolist()
                 if not np.isfinite(middle):
                     continue  # most of them failed
                 top = high if np.isfinite(high) else float(values[np.isfinite(values)].max())
                 estimate = Estimate(middle, low, top)
-                _draw_error_bar(axes, place + shift, estimate, style, linewidth=0.8)
+                _draw_error_bar(axes, place + shift, estimate, LineStyle.of(index), linewidth=0.8)
         axes.set_yscale("log")
         _number_log_axis(axes, "y")
         axes.set_ylabel(metric.label)

@@ -7,7 +7,7 @@ import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
-from ...console.tables import Column, Group, JudgedCell, Table
+from ...console.tables import Column, Group, JudgedCell, Table, named
 from ..verdicts.laws import Estimate, League
 from ..verdicts.requirements import Verdict
 from ..verdicts.rows import GridPoint, law_rows
@@ -39,7 +39,7 @@ MORE_RUNS = (
 
 
 def _columns(labels: Sequence[str], numbers: Sequence[str] = ()) -> list[Column]:
-    return [*(Column(name, is_label=True) for name in labels), *map(Column, numbers)]
+    return [*map(named, labels), *map(Column, numbers)]
 
 
 def number(value: float, spec: str = ".3g") -> str:
@@ -63,16 +63,16 @@ def summary_table(findings: Findings) -> Table:
     rows: list[list[Any]] = [["warning", JudgedCell("", text, "bad")] for text in warned]
     for quantity in findings.required:
         for word in ("met", "not met", "undecided", "not measured"):
-            named = [
+            cases = [
                 f"{findings.names[v.law]} ({v.point})" if v.point else findings.names[v.law]
                 for v in findings.verdicts
                 if (v.requirement, v.word) == (quantity.name, word)
             ]
-            if named:
-                cases = ", ".join(named) if len(named) <= MOST_CASES else f"{len(named)} cases"
-                if len(named) == len(findings.laws) * len(findings.points) > 1:
-                    cases = f"all {len(named)} cases"
-                rows.append([quantity.title, JudgedCell(f"{cases}:", word, TONES[word])])
+            if cases:
+                text = ", ".join(cases) if len(cases) <= MOST_CASES else f"{len(cases)} cases"
+                if len(cases) == len(findings.laws) * len(findings.points) > 1:
+                    text = f"all {len(cases)} cases"
+                rows.append([quantity.title, JudgedCell(f"{text}:", word, TONES[word])])
     rows += [["remark", text] for text in findings.remarks]
     return Table.of("Findings", _columns(["", ""]), rows)
 
@@ -260,7 +260,7 @@ def pair_tables(findings: Findings) -> list[Table]:
 def choice_tables(findings: Findings) -> list[Table]:
     """Tabulate medians and the best laws at each point of the grid, one table per metric."""
     columns = _columns(_grid_names(findings), list(findings.names.values()))
-    columns.append(Column("to fly", is_label=True))
+    columns.append(named("to fly"))
     return [
         Table.of(
             metric.label,
@@ -341,7 +341,7 @@ def worst_table(findings: Findings, point: GridPoint, quantity: Quantity, law: s
         notes.insert(0, f"{equal}; none of them is worse than the others.")
     title = f"Worst runs by {_titled(quantity.label, point.point, findings.names.get(law, ''))}"
     texts = [list(map(str, row)) for row in zip(runs, laws, values, strict=True)]
-    columns = [Column("run"), Column("law", is_label=True), Column("value")]
+    columns = [Column("run"), named("law"), Column("value")]
     return Table(title, columns, [Group(texts)], notes)
 
 

@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from space_robot_model.elementary.matrices import Array
 from space_robot_msgs_py.bag.flight_log import FlightLog, MeasuredStates
 from space_robot_msgs_py.config.validation import one_of
 from space_robot_msgs_py.errors import InputError
@@ -24,8 +25,6 @@ from ...analysis.words import WARNING_GROUPS, warnings
 from ...flight.flown_log import empty_log
 from ...flight.plan import Flight
 from ..study import Condition, Requirement
-
-Array = NDArray[np.float64]
 
 COLUMNS = (
     *("attitude_angle", "attitude", "joints_*", "base_torque", "force_prismatic", "torque_*"),

@@ -12,16 +12,15 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.stats import kruskal, norm, rankdata
+
+from space_robot_model.elementary.matrices import Array
 
 from .laws import Estimate, holm
 from .rows import law_rows, penalised, variables
 
 if TYPE_CHECKING:
     from pandas import DataFrame, Series
-
-Array = NDArray[np.float64]
 
 GROUPS = 8
 """Number of groups of equal size into which a variable's values are divided."""

@@ -17,8 +17,9 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.stats import binom, binomtest
+
+from space_robot_model.elementary.matrices import Array
 
 from .requirements import Interval, share_interval
 from .rows import law_rows, laws_in, penalised
@@ -26,7 +27,6 @@ from .rows import law_rows, laws_in, penalised
 if TYPE_CHECKING:
     from pandas import DataFrame
 
-Array = NDArray[np.float64]
 Finding = Literal["better", "worse", "alike", "contradictory"]
 
 TAIL = 0.99

@@ -17,6 +17,8 @@ from numpy.typing import NDArray
 from scipy.special import betainc, betaln, xlog1py, xlogy
 from scipy.stats import beta, binom, binomtest
 
+from space_robot_model.elementary.matrices import Array
+
 from .rows import EXTERNAL, grid_points, independent_rows, is_complete, law_rows, laws_in, penalised
 
 if TYPE_CHECKING:
@@ -24,7 +26,6 @@ if TYPE_CHECKING:
 
     from ..study import Requirement, Study
 
-Array = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 Word = Literal["met", "not met", "undecided", "not measured"]
 Numbers = float | NDArray[Any]

@@ -8,12 +8,13 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from space_robot_model.elementary.matrices import Array
+
 from ...flight.ending import COMPLETE
 
 if TYPE_CHECKING:
     from pandas import DataFrame
 
-Array = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 
 EXTERNAL = ("killed", "out_of_time", "refused")

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import math
 from contextlib import suppress
+from itertools import islice
 from typing import Any, NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
+from space_robot_model.elementary.matrices import Array
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.config.validation import relative
 from space_robot_msgs_py.errors import MessageError
@@ -18,8 +17,6 @@ from space_robot_msgs_py.wire.telemetry import TelemetryCodec
 
 from .node_names import PLANT
 from .node_services import TemporaryNode
-
-Array = NDArray[np.float64]
 
 MONITOR = "flight_monitor"
 """Name of the node with which a flight is followed."""
@@ -52,9 +49,11 @@ class Monitor:
         self._namespace, self._period = namespace, period
         self.node = self._visitor.node
         group = PolledCallbackGroup()
-        self._clock = RawSubscription(self.node, topics.CLOCK, group, depth=1)
-        self._telemetry = RawSubscription(self.node, topics.TELEMETRY, group, depth=1)
-        self._diagnostics = RawSubscription(self.node, topics.DIAGNOSTICS, group)
+        self._heard = (
+            (RawSubscription(self.node, topics.CLOCK, group, depth=1), self._read_clock),
+            (RawSubscription(self.node, topics.TELEMETRY, group, depth=1), self._read_telemetry),
+            (RawSubscription(self.node, topics.DIAGNOSTICS, group), self._read_diagnostics),
+        )
         self.simulated_s = 0.0
         self.has_begun = False
         """True if the plant has sent a tick."""
@@ -71,15 +70,8 @@ class Monitor:
     def poll(self) -> list[Event]:
         """Take the newest messages; return the nodes' relevant changes of mode."""
         events: list[Event] = []
-        for take, read in (
-            (self._clock.take, self._read_clock),
-            (self._telemetry.take, self._read_telemetry),
-            (self._diagnostics.take, self._read_diagnostics),
-        ):
-            for _ in range(MOST_AT_ONCE):
-                data = take()
-                if data is None:
-                    break
+        for subscription, read in self._heard:
+            for data in islice(iter(subscription.take, None), MOST_AT_ONCE):
                 with suppress(MessageError):  # somebody else's, not fit to be shown
                     events += read(data)
         return events

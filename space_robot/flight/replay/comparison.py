@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from space_robot_model.elementary.matrices import Array
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.errors import MessageError
 from space_robot_msgs_py.samples import Timebase
@@ -18,7 +19,6 @@ from space_robot_msgs_py.wire.codecs import FOREIGN, CompiledCodec
 from space_robot_msgs_py.wire.definitions import decode
 from space_robot_msgs_py.wire.messages import describe, name_order
 
-Array = NDArray[np.float64]
 Ticks = NDArray[np.int64]
 
 

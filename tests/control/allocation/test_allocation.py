@@ -7,9 +7,6 @@ from typing import Any
 import numpy as np
 import pytest
 from allocation_bench import INERTIA, PERIOD, AllocationBench, couples
-from numpy.typing import NDArray
-
-Array = NDArray[np.float64]
 
 
 def test_null_motion_balances_and_the_base_feels_nothing() -> None:

@@ -9,14 +9,13 @@ import pytest
 from allocation_bench import AllocationBench, couples, unit
 from hypothesis import given
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 
 from space_robot_control.allocation.settings import AllocationSettings
 from space_robot_control.allocation.unloading import AssumedTorquers, dump_momentum
+from space_robot_model.elementary.matrices import Array
 from space_robot_model.hardware.base_actuators import MagneticTorquerSettings
 from space_robot_msgs_py.samples import MOST_TORQUERS
 
-Array = NDArray[np.float64]
 SEEDS = st.integers(0, 2**31 - 1)
 COUNTS = st.integers(3, MOST_TORQUERS)
 FIELDS = st.floats(1e-6, 1.0)

@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 import pytest
 from allocation_bench import PERIOD, couples
-from numpy.typing import NDArray
 from scipy.optimize import linprog, nnls
 
 from space_robot_control.allocation.non_negative import NonNegative, solve
@@ -19,10 +18,10 @@ from space_robot_control.allocation.thrusters import (
     modulate,
     within_reach,
 )
+from space_robot_model.elementary.matrices import Array
 from space_robot_model.hardware.base_actuators import ThrusterSettings
 from space_robot_msgs_py.samples import MOST_THRUSTERS
 
-Array = NDArray[np.float64]
 KINDS = ["pwm", "sigma_delta", "schmitt"]
 
 # Non-negative least squares

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from space_robot_control.allocation.allocation import diagnose
 from space_robot_control.allocation.wheels import FULL
+from space_robot_model.elementary.matrices import Array
 
-Array = NDArray[np.float64]
 CUBE = np.eye(3)
 LAYOUTS = {
     "orthogonal": CUBE,

@@ -9,7 +9,6 @@ import pytest
 from allocation_bench import couples
 from closed_loop import GAINS, PERIOD, Loop, law_of
 from hypothesis import assume, given, settings
-from numpy.typing import NDArray
 from oracles import RelativeMotion, multiplied, pinocchio_forward_dynamics, rotation_of
 from strategies import Case, cases, random_quaternion
 
@@ -23,7 +22,6 @@ from space_robot_model.robot import Robot
 from space_robot_msgs_py.errors import SingularAttitudeError
 from space_robot_msgs_py.samples import Reference, ReferenceChunk, RobotState
 
-Array = NDArray[np.float64]
 FREE = BaseActuatorSettings(base_actuation="none")
 REST = Reference.at_rest(6)
 

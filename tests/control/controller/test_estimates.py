@@ -11,7 +11,6 @@ import yaml
 from closed_loop import PERIOD
 from hypothesis import assume, given, settings
 from law_equations import random_gains
-from numpy.typing import NDArray
 from oracles import (
     attitude_jacobian_inertial,
     pinocchio_forward_dynamics,
@@ -26,11 +25,9 @@ from space_robot_control.controller.gains import NOMINAL_H_BAR, read_gains
 from space_robot_control.controller.loop import LawSet
 from space_robot_control.controller.settings import ControllerNodeSettings
 from space_robot_control.laws import ControlLaw, find_law, laws
+from space_robot_model.elementary.matrices import Array
 from space_robot_model.hardware.base_actuators import BaseActuatorSettings
 from space_robot_msgs_py.samples import Reference, RobotState
-
-Array = NDArray[np.float64]
-
 
 WITH_H_BAR = sorted(name for name, law in laws().items() if "h_bar" in law.gain_descriptions())
 FREE = BaseActuatorSettings(base_actuation="none")

@@ -48,6 +48,7 @@ class States:
             patch.setattr(inputs, "RawSubscription", QueuedInput)
             no_node: Any = None
             self.input = StateInput(no_node, names, TIMEBASE)
+        self.parts = [queue.topic for queue in self.input.inputs]
         self._codec = StateCodec(names, TIMEBASE)
         self._state = RobotState.allocate(robot.n)
 
@@ -78,7 +79,7 @@ def test_a_plant_heard_in_mid_flight_is_heard_from_then_on(
 ) -> None:
     """One part is heard before another; what has come of that is looked through for it."""
     bench = States(ROBOT, wheels)
-    heard_from = dict(zip([queue.topic for queue in bench.input.inputs], begin, strict=False))
+    heard_from = dict(zip(bench.parts, begin, strict=False))
     whole = max(heard_from.values())
     for tick in range(whole + more):
         bench.send(tick, *(topic for topic, first in heard_from.items() if tick >= first))
@@ -95,11 +96,10 @@ def test_a_state_that_was_sent_without_a_part_is_passed_over(
 ) -> None:
     """The ones behind it are not, though their parts are heard while its own is looked for."""
     bench = States(ROBOT, wheels=4)
-    parts = [queue.topic for queue in bench.input.inputs]
     monkeypatch.setattr(inputs, "TIMEOUT_S", 0.0)
     found = []
     for tick in range(10):
-        bench.send(tick, *(topic for k, topic in enumerate(parts) if k != part or tick != 5))
+        bench.send(tick, *(topic for k, topic in enumerate(bench.parts) if k != part or tick != 5))
         found += bench.take_all()
     assert found == [tick for tick in range(10) if tick != 5]
 
@@ -107,7 +107,7 @@ def test_a_state_that_was_sent_without_a_part_is_passed_over(
 def test_a_part_that_comes_ahead_is_kept_for_its_state() -> None:
     """Else a controller that is quick enough would be one part behind for good."""
     bench = States(ROBOT)
-    joints, base = (queue.topic for queue in bench.input.inputs)
+    joints, base = bench.parts
     bench.send(0, joints)
     bench.send(1, base)
     assert bench.input.take() is None  # the base's part of tick 0 was never heard
@@ -117,7 +117,7 @@ def test_a_part_that_comes_ahead_is_kept_for_its_state() -> None:
 
 def test_what_came_ahead_is_forgotten_when_a_new_time_begins() -> None:
     bench = States(ROBOT)
-    joints, base = (queue.topic for queue in bench.input.inputs)
+    joints, base = bench.parts
     bench.send(500, joints)
     bench.send(501, base)
     assert bench.input.take() is None
@@ -128,7 +128,7 @@ def test_what_came_ahead_is_forgotten_when_a_new_time_begins() -> None:
 
 def test_a_part_that_cannot_be_read_costs_its_state_alone() -> None:
     bench = States(ROBOT)
-    joints, base = (queue.topic for queue in bench.input.inputs)
+    joints, base = bench.parts
     bench.send(0, joints)
     queue: Any = bench.input.inputs[1]
     queue.send(b"junk")
@@ -139,8 +139,11 @@ def test_a_part_that_cannot_be_read_costs_its_state_alone() -> None:
 
 
 def test_a_controller_of_wheels_listens_to_them_and_not_to_thrusters() -> None:
-    parts = [queue.topic for queue in States(ROBOT, wheels=3).input.inputs]
-    assert parts == [topics.JOINT_STATES, topics.WHEELS_STATE, topics.BASE_STATE]
+    assert States(ROBOT, wheels=3).parts == [
+        topics.JOINT_STATES,
+        topics.WHEELS_STATE,
+        topics.BASE_STATE,
+    ]
 
 
 # References

@@ -13,7 +13,6 @@ from closed_loop import NAVIGATION, PERIOD
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from law_equations import random_gains
-from numpy.typing import NDArray
 from oracles import attitude_jacobian_base, quaternion_of, rotation_of
 from scipy.spatial.transform import Rotation
 from strategies import random_quaternion, random_robot
@@ -26,13 +25,13 @@ from space_robot_control.laws.base import CONSTANT_INERTIA, NO_ESTIMATE, NOMINAL
 from space_robot_control.navigation.navigation import Navigation, navigate
 from space_robot_control.navigation.rate_filters import low_pass_weight
 from space_robot_model.dynamics.attitude import attitude_error_into
+from space_robot_model.elementary.matrices import Array
 from space_robot_model.hardware.base_actuators import BaseActuatorSettings
 from space_robot_model.robot import Robot
 from space_robot_model.robot.kinematics import tool_state
 from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.samples import Reference, ReferenceChunk, RobotState
 
-Array = NDArray[np.float64]
 FREE = BaseActuatorSettings(base_actuation="none")
 TICKS = 6
 M_AXES = (

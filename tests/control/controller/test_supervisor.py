@@ -10,7 +10,6 @@ import pytest
 from closed_loop import GAINS, PERIOD, Loop, law_of
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 
 from space_robot_control.controller.controller import Controller
 from space_robot_control.controller.reference_buffer import ReferenceBuffer
@@ -25,13 +24,13 @@ from space_robot_control.controller.tick import (
 )
 from space_robot_control.controller.time_delay_estimation import LONGEST_GAP
 from space_robot_control.laws import ControlLaw, LawGains, Signals
+from space_robot_model.elementary.matrices import Array
 from space_robot_model.hardware.base_actuators import BaseActuatorSettings
 from space_robot_model.robot import Robot
 from space_robot_msgs_py.compiled.records import Block
 from space_robot_msgs_py.errors import MessageError, UnusableStateError
 from space_robot_msgs_py.samples import STATE_FIELDS, Reference, RobotState
 
-Array = NDArray[np.float64]
 AXES, HOLD = 9, 5
 REST = Reference.at_rest(6)
 """The reference that asks for rest at zero."""

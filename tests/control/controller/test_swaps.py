@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 
 from space_robot.analysis.errors import tracking_error
 from space_robot.flight.flown_log import empty_log
@@ -20,7 +19,6 @@ from space_robot_control.controller.law_choice import Swap, parse_swaps
 from space_robot_control.laws import laws
 from space_robot_msgs_py.bag.flight_log import FlightLog
 
-Array = NDArray[np.float64]
 PERIOD = 5e-4
 
 

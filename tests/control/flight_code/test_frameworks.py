@@ -12,11 +12,10 @@ from pathlib import Path, PurePosixPath
 from typing import Any
 
 import pytest
-from flights import space_robot_here
+from flights import planned, space_robot_here
 
 from space_robot.export.folder import FRAMEWORKS, framework_checks, targets
 from space_robot.export.software import export
-from space_robot.flight.plan import Flight, Scenario, resolve
 from space_robot_control.flight_code.folder import Exported
 from space_robot_control.flight_code.frameworks import framework_files
 from space_robot_control.flight_code.instances import write_sources
@@ -39,12 +38,12 @@ needs_fpp = pytest.mark.skipif(
 
 @cache
 def exported(name: str) -> Exported:
-    return export(Flight(resolve(Scenario.model_validate(SCENARIOS[name]))), ["ctc"])
+    return export(planned(**SCENARIOS[name]), ["ctc"])
 
 
 def named(law: str, robot: str = "mine") -> Exported:
     """Flight software whose only law has this name."""
-    flight = Flight(resolve(Scenario(controller="pd")))
+    flight = planned(controller="pd")
     flight.law.__class__ = type("Renamed", (type(flight.law),), {"name": law})
     return Exported(export(flight).software, robot)
 

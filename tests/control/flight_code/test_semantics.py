@@ -18,7 +18,6 @@ import yaml
 from exported_kernels import needs_compiler
 from hypothesis import example, given
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 from paths import DATA
 
 from space_robot_control.flight_code.c99.language import (
@@ -34,10 +33,10 @@ from space_robot_control.flight_code.files import Files
 from space_robot_control.flight_code.folder import FLAGS, WARNINGS
 from space_robot_control.flight_code.instances import build_library
 from space_robot_model.elementary.functions import sin_cos
+from space_robot_model.elementary.matrices import Array
 from space_robot_msgs_py.compiled.kernels import kernel
 from space_robot_msgs_py.compiled.lanes import uniform, where, whole
 
-Array = NDArray[np.float64]
 pytestmark = needs_compiler
 SPECIAL = [0.0, -0.0, 1.0, -1.0, math.nan, math.inf, -math.inf, 5e-324, 1.7e308]
 floats = st.one_of(st.sampled_from(SPECIAL), st.floats())

@@ -9,16 +9,15 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 from paths import DATA
 from scipy.interpolate import BPoly
 from strategies import random_robot
 
 from space_robot.tuning.warning import effort_remarks, limit_remarks
 from space_robot_control.guidance.mission import Mission, MissionSettings
+from space_robot_model.elementary.matrices import Array
 from space_robot_model.robot import Robot
 
-Array = NDArray[np.float64]
 PERIOD = 5e-4
 ROBOTS = {n: random_robot(np.random.default_rng(n), n) for n in range(1, 10)}
 PAPER_DEG = np.array(

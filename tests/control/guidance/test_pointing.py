@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from oracles.orbit import EARTH_RADIUS, MU
 from scipy.spatial.transform import Rotation
 
@@ -16,11 +16,11 @@ from space_robot_control.guidance.courses import Course, Slew, turn_between
 from space_robot_control.guidance.goals import PointingGoal
 from space_robot_control.guidance.matched_slew import MatchedSlew
 from space_robot_control.guidance.pointing import PointingCourse
+from space_robot_model.elementary.matrices import Array
 from space_robot_model.orbit.ephemeris import AssumedOrbit, Ephemeris
 from space_robot_msgs_py.config.validation import validate
 from space_robot_msgs_py.errors import InputError
 
-Array = NDArray[np.float64]
 IDENTITY = np.array([1.0, 0.0, 0.0, 0.0])
 ISS = {"height": 420e3, "inclination_deg": 51.6, "raan_deg": 30.0, "anomaly_deg": 200.0}
 GTO = {"height": 18e6, "eccentricity": 0.72, "inclination_deg": 7.0, "anomaly_deg": -10.0}

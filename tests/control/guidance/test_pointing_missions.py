@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 from strategies import random_quaternion
 
@@ -19,12 +18,12 @@ from space_robot_control.guidance.live import TrajectoryPoint
 from space_robot_control.guidance.mission import Mission, MissionSettings, pointing_start
 from space_robot_control.guidance.pointing import PointingCourse
 from space_robot_control.guidance.tool_paths import JOIN_S
+from space_robot_model.elementary.matrices import Array
 from space_robot_model.orbit.ephemeris import AssumedOrbit, Ephemeris
 from space_robot_model.robot.find import find_robot
 from space_robot_model.robot.kinematics import tool_state
 from space_robot_msgs_py.errors import InputError
 
-Array = NDArray[np.float64]
 PERIOD = 5e-3
 ROBOT = find_robot("paper")
 START = [0.0, 90.0, 200.0, 20.0, 30.0, 10.0]

@@ -12,7 +12,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from law_equations import EQUATIONS, PERIOD, TICKS, History, forces, random_gains
-from numpy.typing import NDArray
 from paths import ROOT
 
 from space_robot.flight.plan import Flight, Scenario, resolve
@@ -33,7 +32,6 @@ from space_robot_model.robot.find import find_robot
 from space_robot_msgs_py.compiled.records import assign
 from space_robot_msgs_py.errors import InputError
 
-Array = NDArray[np.float64]
 WITH_FRICTION = ("ctc", "ctc_smc", "pd", "pd_feedforward", "slotine_li")
 OPTIONAL = {"k_i", "viscous", "coulomb", "dead_band"}
 

@@ -10,7 +10,6 @@ import pytest
 import scipy.linalg
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 from oracles import attitude_jacobian_base, rotation_of
 from oracles.second_moments import Jacobians, jacobians, second_moments
 from scipy.integrate import solve_ivp
@@ -27,10 +26,10 @@ from space_robot_model.dynamics.regressor import (
     vectors_into,
 )
 from space_robot_model.dynamics.rho_space import RhoSpaceModel, rho_space_into
+from space_robot_model.elementary.matrices import Array
 from space_robot_model.robot import Robot
 from space_robot_msgs_py.compiled.records import assign
 
-Array = NDArray[np.float64]
 PERIOD = 5e-4
 FEW = settings(max_examples=12, deadline=None)
 

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 from scipy.linalg import solve_discrete_are
 
 from space_robot_control.navigation.rate_filters import (
@@ -20,9 +19,9 @@ from space_robot_control.navigation.rate_filters import (
     pass_low,
     tune,
 )
+from space_robot_model.elementary.matrices import Array
 from space_robot_msgs_py.compiled.records import assign
 
-Array = NDArray[np.float64]
 PERIOD = 5e-4
 
 

@@ -13,7 +13,6 @@ from benches import a_state
 from closed_loop import NAVIGATION, PERIOD, Loop, law_of
 from hypothesis import given
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 from oracles import quaternion_of, rotation_of
 from scipy.spatial.transform import Rotation
 from strategies import random_quaternion
@@ -27,12 +26,12 @@ from space_robot_control.navigation.settings import (
     completed,
 )
 from space_robot_model.dynamics.attitude import compose, from_small_rotation, to_small_rotation
+from space_robot_model.elementary.matrices import Array
 from space_robot_model.hardware.sensors import SensorSettings
 from space_robot_model.robot import Robot
 from space_robot_msgs_py.errors import UnusableStateError
 from space_robot_msgs_py.samples import RobotState
 
-Array = NDArray[np.float64]
 OMEGA = np.array([0.02, -0.03, 0.01])
 N = 6
 SETTINGS = NAVIGATION.model_copy(update={"tracker_delay": 0.01, "rate_filter_hz": 0.0})

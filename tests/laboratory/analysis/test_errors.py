@@ -11,7 +11,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
-from numpy.typing import NDArray
 from oracles import rotation_of
 from strategies import random_log
 
@@ -29,6 +28,7 @@ from space_robot.analysis.estimate_error import (
 from space_robot.analysis.report_tables import comparison_table, rms_table
 from space_robot.flight.flown_log import empty_log
 from space_robot.flight.plan import Flight, resolve
+from space_robot_model.elementary.matrices import Array
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.samples import Timebase
@@ -140,7 +140,6 @@ def test_waypoints_and_junctions(log: FlightLog, ticks: list[int], junctions: li
     assert junction_ticks(log) == pytest.approx(junctions, abs=1)
 
 
-Array = NDArray[np.float64]
 FAULTS = [
     "noise_attitude@0:1e-5",
     "noise_joint_position@0:2e-5",

@@ -8,8 +8,8 @@ from pathlib import Path
 import matplotlib
 import numpy as np
 import pytest
+from benches import THRUSTER_PAIRS, hardware, still_log
 from benches import WHEEL_AXES as PYRAMID
-from benches import flat, hardware, still_log
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
@@ -18,7 +18,6 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from numpy.typing import NDArray
 from PIL import Image
 from scipy import signal
 from strategies import random_log, random_robot
@@ -55,21 +54,16 @@ from space_robot.analysis.figures.style import (
 )
 from space_robot.analysis.plotted import PlottedQuantity, flown_quantities
 from space_robot_control.guidance.mission import Mission, MissionSettings
+from space_robot_model.elementary.matrices import Array
 from space_robot_model.hardware.base_actuators import BaseActuatorSettings
 from space_robot_model.robot import Robot
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.samples import Timebase
 
-Array = NDArray[np.float64]
 PERIOD = 0.0005
 PAPER_TIMES = (0.0, 15.0, 30.0)
 WHEELS = {"axes": PYRAMID, "max_momentum": [3.0], "max_torque": [0.5, 0.0, 0.5, 0.5]}
-THRUSTERS = {
-    "positions": flat([sign * axis for axis in np.eye(3) for sign in (1, -1, 1, -1)]),
-    "directions": flat([sign * np.roll(axis, 1) for axis in np.eye(3) for sign in (1, -1, -1, 1)]),
-    "force": [2.0],
-}
-BOTH = hardware(wheels=WHEELS, thrusters=THRUSTERS)
+BOTH = hardware(wheels=WHEELS, thrusters=THRUSTER_PAIRS)
 FREE = BaseActuatorSettings(base_actuation="none")
 
 
@@ -363,7 +357,7 @@ def figure_of(log: FlightLog, kind: str) -> tuple[Figure, list[PlottedQuantity]]
 
 @pytest.mark.parametrize("ticks", [1, 1300])
 def test_the_raster_is_dark_where_a_thruster_is_open(paper_robot: Robot, ticks: int) -> None:
-    log = lively_log(paper_robot, hardware(thrusters=THRUSTERS), ticks)
+    log = lively_log(paper_robot, hardware(thrusters=THRUSTER_PAIRS), ticks)
     pulses, used, _ = figure_of(log, "thrusters")[0].axes
     (image,) = pulses.get_images()
     shown = np.asarray(image.get_array())

@@ -11,7 +11,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
-from numpy.typing import NDArray
 from oracles import rotation_of
 from scipy.signal import periodogram, welch
 from scipy.spatial.transform import Rotation
@@ -36,11 +35,11 @@ from space_robot.analysis.measure import all_metrics, label, names
 from space_robot.analysis.report_tables import comparison_table, rms_table
 from space_robot.analysis.torques import desired_torque, hann, ripple_spectrum, segment_spectra
 from space_robot.analysis.words import notes, remarks, with_statistic
+from space_robot_model.elementary.matrices import Array
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.samples import Timebase
 
-Array = NDArray[np.float64]
 PERIOD = 0.0005
 COLUMNS: dict[int, dict[str, list[int]]] = {
     1: {"base": [0, 1, 2], "1_1": [3]},

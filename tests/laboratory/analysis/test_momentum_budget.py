@@ -15,7 +15,6 @@ import pytest
 from bags import messages_in
 from benches import WHEEL_AXES as PYRAMID
 from benches import flat, hardware, still_log
-from numpy.typing import NDArray
 from oracles import pinocchio_model, rotation_of
 from scipy.integrate import solve_ivp
 
@@ -25,6 +24,7 @@ from space_robot.analysis.analysed_log import AnalysedLog
 from space_robot.analysis.momentum import MomentumSeries, whole_momentum
 from space_robot.analysis.report_tables import comparison_table
 from space_robot.analysis.words import analyzed
+from space_robot_model.elementary.matrices import Array
 from space_robot_model.hardware.base_actuators import BaseActuatorSettings
 from space_robot_model.robot import Robot
 from space_robot_msgs_py import topics
@@ -34,7 +34,6 @@ from space_robot_msgs_py.bag.reader import read_flight
 from space_robot_msgs_py.bag.recorder import BagRecorder
 from space_robot_msgs_py.samples import SOURCES
 
-Array = NDArray[np.float64]
 POSTURE = np.array([0.3, -0.8, 1.1, 0.2, -0.5, 0.9])
 WHEELS = {"axes": PYRAMID, "rotor_inertia": [0.1, 0.2, 0.1, 0.3], "initial_speed": [20.0]}
 ROWS, PERIOD = 401, 0.005

@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 import pytest
 import yaml
-from numpy.typing import NDArray
 from paths import CONFIG
 from robots import PLATES, driven_paper
 from strategies import random_log
@@ -27,7 +26,6 @@ from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.bag.reader import read_flight
 from space_robot_msgs_py.samples import RobotNames, Timebase
 
-Array = NDArray[np.float64]
 Report = dict[str, Any]
 HEIGHT = 543e3
 

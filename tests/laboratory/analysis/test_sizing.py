@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+from benches import THRUSTER_PAIRS, flat, hardware, still_log
 from benches import WHEEL_AXES as PYRAMID
-from benches import flat, hardware, still_log
 from oracles import quaternion_of
 from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
@@ -26,13 +26,7 @@ from space_robot_model.robot import Robot
 from space_robot_msgs_py.bag.flight_log import FlightLog
 
 PERIOD = 0.0005
-PAIRS = {
-    "positions": flat([sign * axis for axis in np.eye(3) for sign in (1, -1, 1, -1)]),
-    "directions": flat([sign * np.roll(axis, 1) for axis in np.eye(3) for sign in (1, -1, -1, 1)]),
-    "force": [2.0],
-    "specific_impulse": [200.0],
-}
-"""Twelve thrusters, in pairs on levers of 1 m about +z, -z, +x, -x, +y, -y."""
+PAIRS = {**THRUSTER_PAIRS, "specific_impulse": [200.0]}
 
 
 def turning_log(robot: Robot, rate: float, ticks: int = 2001) -> FlightLog:

@@ -15,17 +15,16 @@ from bags import messages_of
 from flights import space_robot_here
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 
 from space_robot import Bench, Scenario, load_bag
 from space_robot.flight.replay.choice import ControllerChoice
 from space_robot_control.laws.ctc import ComputedTorque
+from space_robot_model.elementary.matrices import Array
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.compiled import records
 from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.samples import RobotState
 
-Array = NDArray[np.float64]
 PLAIN = Scenario(controller=None, sensors="fine", duration=0.1)
 RICH = Scenario(
     controller="tde_stc",

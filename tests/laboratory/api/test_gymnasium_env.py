@@ -9,13 +9,11 @@ import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
 from gymnasium.wrappers import PassiveEnvChecker
-from numpy.typing import NDArray
 
 from space_robot import Scenario
 from space_robot.api.gymnasium_env import NAME, WORST_COST, SpaceRobotEnv
+from space_robot_model.elementary.matrices import Array
 from space_robot_msgs_py.errors import InputError
-
-Array = NDArray[np.float64]
 
 SCENARIO = Scenario(controller=None, sensors="fine", duration=0.2)
 

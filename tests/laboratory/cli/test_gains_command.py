@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 import yaml
 from click.testing import CliRunner, Result
+from flights import planned, simulated
 from paths import CONFIG
 from robots import geared_paper_arm
 
@@ -18,8 +19,6 @@ from space_robot.campaign.row.fly import RowFlyer
 from space_robot.campaign.row.row import Task
 from space_robot.campaign.study import Study, read_study
 from space_robot.cli.main import cli
-from space_robot.flight.plan import Flight, Scenario, resolve
-from space_robot.flight.simulate import simulate
 from space_robot_control.controller.settings import ControllerNodeSettings
 from space_robot_control.laws import laws
 from space_robot_model.robot import Robot
@@ -100,12 +99,12 @@ def test_a_set_for_a_mission_that_points_needs_its_orbit_and_knows_the_tick(tmp_
 def test_a_set_for_segments_is_in_the_bag_and_may_be_overruled(tmp_path: Path) -> None:
     """Also what it says to the controller."""
     assert tune(tmp_path, "--mission", "line").exit_code == 0
-    flight = Flight(resolve(Scenario(gains=str(tmp_path))))
+    flight = planned(gains=str(tmp_path))
     corner = flight.controller_settings.acceleration_filter_hz
     recorded = flight.description["scenario"]["parameters"]["controller"]
     assert recorded["acceleration_filter_hz"] == corner > 0.0
     given = {"controller": {"acceleration_filter_hz": 7.0}}
-    over = Flight(resolve(Scenario(gains=str(tmp_path), parameters=given)))
+    over = planned(gains=str(tmp_path), parameters=given)
     assert over.controller_settings.acceleration_filter_hz == 7.0
     alone = ControllerNodeSettings.resolve({"gains": str(tmp_path)})  # as a node by itself has it
     assert alone.acceleration_filter_hz == corner
@@ -135,7 +134,7 @@ def test_laws_with_the_nominal_inertia_are_checked_as_such_and_fly(tmp_path: Pat
     assert masses["wrong_masses"]["largest"] == pytest.approx(1.0 / 0.9)
     text = run("check", *own).stdout
     assert "h_bar of indi, tde_smc, tde_stc, tde_tsmc is H_S of the nominal model" in text
-    simulate(Flight(resolve(Scenario(gains=str(tmp_path), duration=0.05))))
+    simulated(gains=str(tmp_path), duration=0.05)
 
 
 @pytest.fixture(scope="module")

@@ -5,14 +5,13 @@ from __future__ import annotations
 import re
 import shutil
 import stat
-import subprocess
 import sys
 from pathlib import Path
 
 import pytest
 from click.shell_completion import CompletionItem, ShellComplete
 from click.testing import CliRunner
-from command import Run
+from command import Run, run_program
 from pages import TOPICS
 from paths import CONFIG, DOCS, ROOT
 
@@ -135,13 +134,8 @@ def test_bash_completes(space_robot: Run, tmp_path: Path) -> None:
     command.chmod(command.stat().st_mode | stat.S_IXUSR)
     script = space_robot("completion", "bash").out
     words = 'COMP_WORDS=(space-robot simulate --case 4); COMP_CWORD=3; _space_robot_completion "$0"'
-    done = subprocess.run(
-        [bash, "-c", f'{script}\n{words}\necho "${{COMPREPLY[@]}}"', str(command)],
-        capture_output=True,
-        text=True,
-        timeout=60,
-        check=False,
-    )
+    lines = f'{script}\n{words}\necho "${{COMPREPLY[@]}}"'
+    done = run_program([bash, "-c", lines, str(command)], timeout=60)
     assert done.stdout == "4-1 4-2\n", done.stderr
 
 

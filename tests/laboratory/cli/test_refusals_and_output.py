@@ -15,13 +15,12 @@ from typing import Any, NamedTuple
 import pytest
 import yaml
 from command import Run
+from flights import simulated
 from flights import space_robot as started
 from paths import CONFIG, DATA
 from robots import driven_paper
 
 from space_robot.console.files import ABANDONED_S, atomic_file, atomic_folder
-from space_robot.flight.plan import Flight, Scenario, resolve
-from space_robot.flight.simulate import simulate
 from space_robot_model.robot.parts import MOST_PLATES
 from space_robot_msgs_py.errors import InputError
 from space_robot_sim.environment import surfaces
@@ -86,7 +85,7 @@ def content_of(group: Group, given: Any) -> str:
 @pytest.fixture(scope="module")
 def bag(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("bags") / "bag"
-    simulate(Flight(resolve(Scenario(controller="ctc", duration=0.3))), path)
+    simulated(path, controller="ctc", duration=0.3)
     return path
 
 

@@ -11,14 +11,13 @@ from pathlib import Path, PurePosixPath
 from typing import Any
 
 import pytest
-from command import Run
-from flights import space_robot_here
+from command import Run, run_program
+from flights import planned, space_robot_here
 from paths import ROOT
 from robots import driven_paper
 
 from space_robot.export.folder import CROSS, EMULATORS
 from space_robot.export.software import export
-from space_robot.flight.plan import Flight, Scenario, resolve
 from space_robot_control.flight_code.folder import Exported
 from space_robot_control.laws import laws
 from space_robot_model.robot import Robot
@@ -66,7 +65,7 @@ def exported(tmp_path_factory: pytest.TempPathFactory) -> Exports:
 def make(folder: Path, *arguments: str) -> str:
     """What make prints; it must succeed without a warning."""
     command = ["make", "--no-print-directory", "-C", str(folder), *arguments]
-    run = subprocess.run(command, capture_output=True, text=True, check=False)
+    run = run_program(command)
     assert run.returncode == 0, run.stdout + run.stderr
     assert "warning" not in run.stderr
     return run.stdout
@@ -200,7 +199,7 @@ def test_what_is_verified_is_told_in_json(tmp_path: Path, space_robot: Run) -> N
     for switch in one_law.split("    switch (")[1:]:  # MISRA's rule 16.6
         assert len(re.findall(r"^    (case|default)\b", switch.split("\n    }")[0], re.M)) > 1
     fast = ["gcc", "-ffast-math", "-Iinclude", "-I.", "-fsyntax-only", "src/laws.c"]
-    refused = subprocess.run(fast, cwd=folder, capture_output=True, text=True, check=False)
+    refused = run_program(fast, cwd=folder)
     assert refused.returncode != 0
     assert "compile the flight software without -ffast-math" in refused.stderr
 
@@ -216,7 +215,7 @@ def test_a_wrong_bit_is_found(tmp_path: Path, exported: Exports) -> None:
     assert changed != text
     header.write_text(changed, "utf-8")
     command = ["make", "-C", str(folder), "BUILD=wrong", "COMPILERS=gcc", QUICK]
-    run = subprocess.run(command, capture_output=True, text=True, check=False)
+    run = run_program(command)
     assert run.returncode != 0
     assert re.search(r"mission\.bin: tick \d+: ", run.stdout)
 
@@ -225,7 +224,7 @@ RIGID: dict[str, Any] = {"sensors": "fine", "navigation": "filtered", "swaps": [
 
 
 def code_of(**options: Any) -> Exported:
-    return export(Flight(resolve(Scenario.model_validate(options))))
+    return export(planned(**options))
 
 
 def test_gears_and_orbit_of_the_plant_are_no_part_of_the_flight_software() -> None:

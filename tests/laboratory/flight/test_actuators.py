@@ -9,17 +9,15 @@ import numpy as np
 import pytest
 from bags import messages_in
 from flights import planned
-from numpy.typing import NDArray
 
 from space_robot.analysis import tracking_error
 from space_robot.flight.plan import Flight
 from space_robot.flight.simulate import simulate
+from space_robot_model.elementary.matrices import Array
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.bag.reader import read_flight
 from space_robot_msgs_py.errors import SingularAttitudeError
-
-Array = NDArray[np.float64]
 
 
 def fly(bag: Path | None = None, **options: Any) -> tuple[Flight, FlightLog]:

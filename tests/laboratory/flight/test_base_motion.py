@@ -9,7 +9,6 @@ import pytest
 from flights import planned, simulated
 from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 from oracles.momenta import momentum
 from scipy.spatial.transform import Rotation
 
@@ -18,11 +17,10 @@ from space_robot.analysis.errors import attitude_drift, tracking_error
 from space_robot.flight.plan import Flight
 from space_robot.flight.simulate import simulate
 from space_robot_control.laws import laws
+from space_robot_model.elementary.matrices import Array
 from space_robot_model.robot.dynamics import inverse_dynamics
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.errors import SingularAttitudeError
-
-Array = NDArray[np.float64]
 
 JOINTS = [0, 90, 200, 20, 30, 10]
 SENSORS: dict[str, dict[str, Any]] = {

@@ -10,7 +10,6 @@ import pytest
 from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 from matrix.scenarios import columns_of, difference
-from numpy.typing import NDArray
 
 import space_robot as sr
 from space_robot import Scenario
@@ -20,11 +19,11 @@ from space_robot.flight.benches import Benches
 from space_robot.flight.plan import Flight
 from space_robot.flight.simulate import simulate
 from space_robot_control.laws import laws
+from space_robot_model.elementary.matrices import Array
 from space_robot_msgs_py.bag.flight_log import MEASURED_COLUMNS, FlightLog
 from space_robot_msgs_py.compiled.lanes import WIDTH
 from space_robot_msgs_py.errors import FlightError, InputError
 
-Array = NDArray[np.float64]
 Flown = tuple[FlightLog, str]
 
 

@@ -14,20 +14,18 @@ from flights import planned, simulated
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from matrix.scenarios import difference
-from numpy.typing import NDArray
 
 from space_robot import Robot, Scenario
 from space_robot.analysis import analyze
 from space_robot.analysis.errors import tracking_error
 from space_robot.analysis.words import with_statistic
 from space_robot.flight.simulate import simulate
+from space_robot_model.elementary.matrices import Array
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.errors import FlightError
 from space_robot_sim.environment.friction import FrictionSettings
 from space_robot_sim.faults.messages import MESSAGE_KINDS
-
-Array = NDArray[np.float64]
 
 
 @pytest.mark.parametrize(("latency", "bound"), [(1, 1e-6), (4, 5e-6)])

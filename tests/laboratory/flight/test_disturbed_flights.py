@@ -15,17 +15,15 @@ import yaml
 from attitude_sensors import attitude_error
 from command import Run
 from flights import planned, simulated
-from numpy.typing import NDArray
 
 import space_robot as sr
 from space_robot.flight.flown_log import empty_log
 from space_robot.flight.simulate import close_loop
 from space_robot.scenario.recorded import options_in_bag
 from space_robot_control.laws import laws
+from space_robot_model.elementary.matrices import Array
 from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.samples import Command
-
-Array = NDArray[np.float64]
 
 # Sensors
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import subprocess
 from collections import defaultdict
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -11,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from command import run_program
 from flights import planned
 from matrix.scenarios import PLANS, Planned, in_root
 from mcap.reader import make_reader
@@ -158,7 +158,7 @@ def test_a_large_bag_is_announced_with_its_size(
 def test_versions_and_commit_are_those_installed() -> None:
     assert software.versions()["numpy"] == np.__version__
     command = ["git", "-C", str(ROOT), "rev-parse", "HEAD"]
-    done = subprocess.run(command, capture_output=True, text=True)
+    done = run_program(command)
     head = done.stdout.strip()
     known = (head, f"{head}-dirty") if done.returncode == 0 else (None,)
     assert software.commit() in known

@@ -12,7 +12,6 @@ import pytest
 import scipy.linalg
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 from oracles.rotors import (
     order_of,
     pinocchio_motion,
@@ -32,13 +31,13 @@ from space_robot.tuning.flexible import (
     joint_frequencies,
 )
 from space_robot_control.laws import ControlLaw, find_law
+from space_robot_model.elementary.matrices import Array
 from space_robot_model.robot import Robot
 from space_robot_model.robot.find import find_robot
 from space_robot_model.robot.gears import geared_joints
 from space_robot_model.robot.parts import Encoder, Gear
 from space_robot_sim.plant.tick import update_true_state
 
-Array = NDArray[np.float64]
 PERIOD = 5e-4
 UPRIGHT = np.array([1.0, 0.0, 0.0, 0.0])
 TURNED = np.array([0.6, 0.48, -0.4, 0.4964])

@@ -11,7 +11,6 @@ import scipy.linalg
 from closed_loop import H_BAR
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 
 from space_robot.cli.options import remarks_on
 from space_robot.flight.plan import Flight, Scenario, resolve
@@ -30,9 +29,9 @@ from space_robot.tuning.linear_law import LinearLaw, linear_law, linear_laws
 from space_robot.tuning.warning import margin_remarks
 from space_robot_control.controller.settings import ControllerNodeSettings
 from space_robot_control.laws import ControlLaw, LawGains, Signals, find_law, per_axis
+from space_robot_model.elementary.matrices import Array
 from space_robot_msgs_py.errors import DivergedError
 
-Array = NDArray[np.float64]
 PERIOD = 5e-4
 SLOW = {"k_p": 1e-4, "k_d": 2e-2}
 """Poles at 0.01 rad/s: u does not move the limits of the estimate."""

@@ -14,7 +14,6 @@ import pinocchio as pin
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 from oracles import pinocchio_tree
 from scene_pages import Scene, moving_log, page_of
 from strategies import random_tree
@@ -26,6 +25,7 @@ from space_robot.analysis.plotted import flown_quantities
 from space_robot.view.animation import DESIRED, PIECES, ShownFlight, animate, trails
 from space_robot.view.flights import Mark, ViewOptions, flight_marks, shared_marks, shown_robot
 from space_robot.view.frames import MOST_FRAMES, Frames, shown_times
+from space_robot_model.elementary.matrices import Array
 from space_robot_model.robot import Robot
 from space_robot_model.robot.placements import frame_names, tool_pose
 from space_robot_msgs_py.bag.flight_log import FlightLog
@@ -33,7 +33,6 @@ from space_robot_msgs_py.bag.reader import read_flight
 from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.samples import Timebase
 
-Array = NDArray[np.float64]
 Flown = Callable[..., FlightLog]
 TOLERANCE = 1e-6
 """m, and of the axes' numbers."""

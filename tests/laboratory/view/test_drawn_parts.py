@@ -12,7 +12,6 @@ import pytest
 import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 from scene_pages import Scene, moving_log, page_of
 from scipy.integrate import cumulative_trapezoid
 from scipy.spatial.transform import Rotation
@@ -214,7 +213,6 @@ def test_a_mesh_is_drawn_in_its_size_and_a_mirrored_one_looks_outwards(
         assert shown.volume == pytest.approx(0.006, rel=1e-5)
 
 
-Array = NDArray[np.float64]
 PERIOD = Timebase(10_000_000)
 WHEELS = WheelSettings(
     axes=[1.0, 0.0, 0.0, 0.0, 1.0, 0.0], max_torque=[2.0], max_momentum=[10.0], rotor_inertia=[0.1]

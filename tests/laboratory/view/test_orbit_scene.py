@@ -13,7 +13,6 @@ import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.linalg import norm
-from numpy.typing import NDArray
 from scene_pages import (
     EARTH_RADIUS,
     CircularOrbit,
@@ -38,13 +37,13 @@ from space_robot.view.orbit import (
 )
 from space_robot.view.scene import local_server, turns_from_z
 from space_robot.view.stage import DIRECTION, FIELD_OF_VIEW, LAMPS, SIDES, clearest_side, set_stage
+from space_robot_model.elementary.matrices import Array
 from space_robot_model.robot import Robot
 from space_robot_model.robot.find import find_robot
 from space_robot_model.robot.parts import Visual
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.samples import ORBIT_FIELDS
 
-Array = NDArray[np.float64]
 SECOND = 1_000_000_000
 GRAY = Shades(((255,) * 3, (0,) * 3), ((9,) * 3, (9,) * 3), (((99,) * 3, (99,) * 3),) * 3)
 """The ground is white by day and black by night."""

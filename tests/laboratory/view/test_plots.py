@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 from scene_pages import moving_log
 from scipy.spatial.transform import Rotation
 
@@ -26,7 +25,6 @@ from space_robot_model.robot.parts import Gear
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.samples import Timebase
 
-Array = NDArray[np.float64]
 NUMBERS = st.one_of(st.floats(-1e3, 1e3), st.sampled_from([0.0, np.nan, np.inf, -np.inf]))
 
 

@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from robots import circular_orbit, meeting_target, target_of
 from scene_pages import Scene, moving_log, page_of
 from scipy.integrate import solve_ivp
@@ -16,6 +15,7 @@ from scipy.spatial.transform import Rotation
 from space_robot.view import targets as drawing
 from space_robot.view.flights import ViewOptions
 from space_robot.view.targets import before_capture, held_poses
+from space_robot_model.elementary.matrices import Array
 from space_robot_model.robot import Robot
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_sim.environment.events import Capture, Release
@@ -23,7 +23,6 @@ from space_robot_sim.environment.impact import Grasp
 from space_robot_sim.environment.neighbouring_orbit import free_fall, target_state
 from space_robot_sim.environment.target import Target
 
-Array = NDArray[np.float64]
 TICK_S, TICKS = 0.1, 41
 
 

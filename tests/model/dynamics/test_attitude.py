@@ -6,7 +6,6 @@ from collections.abc import Callable
 
 import numpy as np
 from hypothesis import assume, given
-from numpy.typing import NDArray
 from oracles import attitude_jacobian_inertial, rotation_of, turned
 from strategies import RNGS, random_quaternion
 
@@ -16,8 +15,7 @@ from space_robot_model.dynamics.attitude import (
     quaternion_rate,
     rotation_matrix,
 )
-
-Array = NDArray[np.float64]
+from space_robot_model.elementary.matrices import Array
 
 
 def written(kernel: Callable[..., None], shape: tuple[int, ...], *arguments: Array) -> Array:

@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 from oracles import (
     attitude_jacobian_base,
     attitude_jacobian_inertial,
@@ -62,6 +61,7 @@ from space_robot_model.dynamics.rho_space import (
     rho_space_into,
     semi_floating_into,
 )
+from space_robot_model.elementary.matrices import Array
 from space_robot_model.robot import Robot
 from space_robot_model.robot.dynamics import (
     bias_force,
@@ -72,7 +72,6 @@ from space_robot_model.robot.dynamics import (
 )
 from space_robot_msgs_py.samples import MOST_WHEELS, ReferenceChunk
 
-Array = NDArray[np.float64]
 FEW = settings(max_examples=40)
 
 

@@ -25,6 +25,7 @@ from space_robot_model.elementary.linear_algebra import (
     solve_cholesky,
 )
 from space_robot_model.elementary.matrices import (
+    Array,
     dot_rows,
     norm,
     norms,
@@ -130,9 +131,6 @@ def test_normal_numbers_are_those_of_numpys_generator(seed: int, key: int, block
     one_by_one = np.empty((8, 6))
     normal_numbers_of_one(one_by_one, float(seed), key, block)
     np.testing.assert_array_equal(one_by_one, draws)
-
-
-Array = NDArray[np.float64]
 
 
 @given(RNGS, st.integers(1, 7), st.integers(0, 3))

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 from oracles.orbit import DIGITS, EARTH_RADIUS, MU, exact, fall, free_path
 from pydantic import ValidationError
 from scipy.optimize import brentq
@@ -71,9 +70,6 @@ def test_the_sun_stands_above_the_orbit_and_at_noon(
     assumed = {"inclination_deg": inclination, "raan_deg": raan}
     known = ephemeris(orbital_elements=ISS | assumed, beta_angle_deg=beta, noon_deg=noon)
     np.testing.assert_array_equal(known.sun, sun)
-
-
-Array = NDArray[np.float64]
 
 
 ISS = {"height": 420e3, "inclination_deg": 51.6, "raan_deg": 30.0, "anomaly_deg": 200.0}

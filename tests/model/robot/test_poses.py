@@ -9,7 +9,6 @@ import pinocchio as pin
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 from oracles import ToolOracle, TreeOracle, assert_close, pinocchio_tree, rotation_of
 from scipy.spatial.transform import Rotation
 from strategies import (
@@ -22,6 +21,7 @@ from strategies import (
     random_tree,
 )
 
+from space_robot_model.elementary.matrices import Array
 from space_robot_model.elementary.rotations import quaternion_of_rotation
 from space_robot_model.robot import Robot
 from space_robot_model.robot.find import find_robot, robot_names
@@ -47,7 +47,6 @@ from space_robot_msgs_py.topics import INERTIAL_FRAME
 from space_robot_msgs_py.wire.definitions import decode
 from space_robot_msgs_py.wire.viewers import no_markers
 
-Array = NDArray[np.float64]
 UPRIGHT = [1.0, 0.0, 0.0, 0.0]
 
 

@@ -14,7 +14,6 @@ import pinocchio as pin
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 from oracles import TreeOracle, assert_same_dynamics
 from paths import DATA
 from strategies import (
@@ -28,6 +27,7 @@ from strategies import (
 )
 
 from space_robot.cli.main import _run
+from space_robot_model.elementary.matrices import Array
 from space_robot_model.robot import Robot
 from space_robot_model.robot.find import find_robot
 from space_robot_model.robot.flatten import SETTINGS_FRICTION
@@ -37,7 +37,6 @@ from space_robot_model.robot.urdf import Mount, UrdfRobot, mounted_urdf, read_ur
 from space_robot_model.robot.urdf_tree import solid_inertia
 from space_robot_msgs_py.errors import InputError
 
-Array = NDArray[np.float64]
 FILE = Path("random.urdf")
 SHAPES = ('<box size="1 2 3"/>', '<cylinder radius="1" length="2"/>', '<sphere radius="0.5"/>')
 

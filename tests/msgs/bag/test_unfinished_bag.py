@@ -21,12 +21,11 @@ from bags import (
     messages_of,
     record,
 )
+from flights import simulated
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from space_robot.analysis import analyze
-from space_robot.flight.plan import Flight, Scenario, resolve
-from space_robot.flight.simulate import simulate
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.bag import recorder as recorder_module
 from space_robot_msgs_py.bag.folder import open_bag
@@ -160,7 +159,7 @@ def test_full_disk_at_the_beginning_and_under_a_simulated_flight(tmp_path: Path)
     with _file_size_limit(100), pytest.raises(InputError, match="File too large"):
         BagRecorder(tmp_path / "bag", FLIGHT, TIMEBASE)
     with _file_size_limit(50_000), pytest.raises(FlightError, match="last tick kept"):
-        simulate(Flight(resolve(Scenario(duration=0.1))), tmp_path / "other")
+        simulated(tmp_path / "other", duration=0.1)
 
 
 def test_full_disk_at_the_end_loses_no_message(messages: Messages, tmp_path: Path) -> None:

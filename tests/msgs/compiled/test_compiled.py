@@ -11,6 +11,7 @@ from pathlib import Path
 import numba
 import numpy as np
 import pytest
+from command import run_program
 from numpy.typing import NDArray
 from paths import ROOT
 
@@ -38,13 +39,7 @@ def run(tmp_path: Path, cache: Path) -> subprocess.CompletedProcess[str]:
     (tmp_path / "some_kernel.py").write_text(KERNEL)
     program = PROGRAM.format(file=str(tmp_path / "some_kernel.py"))
     environment = {**os.environ, "NUMBA_CACHE_DIR": str(cache), "TMPDIR": str(tmp_path)}
-    return subprocess.run(
-        [sys.executable, "-c", program],
-        env=environment,
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    return run_program([sys.executable, "-c", program], env=environment)
 
 
 @pytest.mark.parametrize(

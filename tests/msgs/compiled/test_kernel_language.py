@@ -15,10 +15,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from numba.core.errors import NumbaError
-from numpy.typing import NDArray
 from paths import ROOT
 
 from space_robot_model.elementary.functions import sin_cos
+from space_robot_model.elementary.matrices import Array
 from space_robot_msgs_py.compiled.kernels import kernel
 from space_robot_msgs_py.compiled.lanes import (
     WIDTH,
@@ -137,7 +137,6 @@ def test_what_is_uniform_is_declared_so() -> None:
 
 # Numbers eight flights wide: every lane has the bits of the same kernel of plain numbers
 
-Array = NDArray[np.float64]
 RESULTS = 22
 ANY = st.floats(width=64, allow_nan=True, allow_infinity=True, allow_subnormal=True)
 NUMBERS = arrays(np.float64, (2, WIDTH), elements=ANY)

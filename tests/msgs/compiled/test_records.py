@@ -13,11 +13,11 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 
 import space_robot_control
 import space_robot_model
 import space_robot_sim
+from space_robot_model.elementary.matrices import Array
 from space_robot_msgs_py.compiled.kernels import RecordFunction, kernel
 from space_robot_msgs_py.compiled.records import (
     Block,
@@ -31,8 +31,6 @@ from space_robot_msgs_py.compiled.records import (
     shaped,
 )
 from space_robot_msgs_py.errors import InputError
-
-Array = NDArray[np.float64]
 
 
 class Inner(Record):

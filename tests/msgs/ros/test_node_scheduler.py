@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import gc
 import itertools
-import subprocess
 import sys
 from collections.abc import Sequence
 from types import SimpleNamespace
 from typing import Any
 
 import pytest
+from command import run_program
 
 pytest.importorskip("rclpy")
 
@@ -319,7 +319,7 @@ def test_the_middleware_has_a_higher_priority_than_the_loop_or_it_is_told_that_i
         "tasks = [int(task) for task in os.listdir('/proc/self/task')];"
         "print([os.sched_getparam(task).sched_priority for task in sorted(tasks)])"
     )
-    ran = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
+    ran = run_program([sys.executable, "-c", program])
     told, priorities = ran.stdout.splitlines()
     if told == "SCHED_FIFO 3":
         assert priorities.startswith("[3, 4"), priorities

@@ -16,6 +16,7 @@ from typing import Any
 
 import psutil
 import pytest
+from command import run_program
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -188,13 +189,7 @@ def test_ros_starts_without_a_home() -> None:
         "from space_robot.flight.graph.node_services import TemporaryNode;"
         f"TemporaryNode('nobody', {os.getpid() % 100}).leave()"
     )
-    result = subprocess.run(
-        [sys.executable, "-c", program],
-        check=False,
-        capture_output=True,
-        text=True,
-        env={**environment, "HOME": ""},
-    )
+    result = run_program([sys.executable, "-c", program], env={**environment, "HOME": ""})
     assert result.returncode == 0, result.stderr
 
 

@@ -16,11 +16,11 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 from random_samples import TIMEBASE, joint_names, ros_type, serialization
 from rosbags.serde import SerdeError
 from rosbags.typesys import Stores, get_typestore
 
+from space_robot_model.elementary.matrices import Array
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.errors import MessageError
 from space_robot_msgs_py.samples import Command, ReferenceChunk, RobotNames, RobotState
@@ -28,7 +28,6 @@ from space_robot_msgs_py.wire import messages as general_way
 from space_robot_msgs_py.wire.codecs import CommandCodec, StateCodec
 from space_robot_msgs_py.wire.telemetry import ReferenceCodec
 
-Array = NDArray[np.float64]
 Read = tuple[int, bytes] | None
 """Tick and numbers of a message, bit for bit; None if it is refused."""
 STORE = get_typestore(Stores.ROS2_JAZZY)

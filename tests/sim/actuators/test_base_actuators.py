@@ -11,12 +11,11 @@ from benches import WHEEL_AXES as PYRAMID
 from benches import ActuatorBench as Bench
 from hypothesis import given
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 from strategies import SEEDS
 
+from space_robot_model.elementary.matrices import Array
 from space_robot_msgs_py.samples import MOST_TORQUERS
 
-Array = NDArray[np.float64]
 WHEELS: dict[str, Any] = {
     "axes": PYRAMID,
     "rotor_inertia": [0.1],

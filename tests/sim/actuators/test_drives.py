@@ -8,13 +8,11 @@ from benches import PERIOD, N
 from benches import ActuatorBench as Bench
 from hypothesis import given
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 from scipy.linalg import expm
 from strategies import SEEDS
 
+from space_robot_model.elementary.matrices import Array
 from space_robot_sim.actuators.drive import Drive
-
-Array = NDArray[np.float64]
 
 
 def torques(seed: int, ticks: int = 50, size: float = 10.0) -> Array:

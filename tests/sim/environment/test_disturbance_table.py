@@ -10,12 +10,12 @@ import pytest
 import yaml
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 from paths import DATA
 from pydantic import ValidationError
 from strategies import KINDS, random_robot, random_tree
 
 from space_robot_model.dynamics.model import MOST_JOINTS
+from space_robot_model.elementary.matrices import Array
 from space_robot_model.robot import Robot
 from space_robot_msgs_py.compiled.records import assign
 from space_robot_msgs_py.errors import InputError
@@ -47,7 +47,6 @@ from space_robot_sim.faults.grammar import parse_faults
 from space_robot_sim.faults.schedule import Schedule
 from space_robot_sim.plant.settings import PLANT_KINDS
 
-Array = NDArray[np.float64]
 REFUSALS = yaml.safe_load((DATA / "refusals/environment.yaml").read_text("utf-8"))
 TABLES = [tuple(row) for row in REFUSALS["tables"]]
 FOUR = random_robot(np.random.default_rng(4), 4)

@@ -13,7 +13,6 @@ import pytest
 import yaml
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 from oracles import pinocchio_model, pinocchio_state, rotation_of, to_base_axes
 from paths import CONFIG, DATA
 from robots import tensor_of
@@ -27,6 +26,7 @@ from strategies import (
     random_state,
 )
 
+from space_robot_model.elementary.matrices import Array
 from space_robot_model.robot import Robot
 from space_robot_model.robot.parts import Tool
 from space_robot_msgs_py.errors import InputError
@@ -116,9 +116,6 @@ def test_any_text_is_read_or_refused(text: str) -> None:
     except InputError as error:
         said = str(error)
     assert "\n" not in said
-
-
-Array = NDArray[np.float64]
 
 
 class Case(NamedTuple):

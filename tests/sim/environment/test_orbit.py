@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from oracles.orbit import (
     EARTH_RADIUS,
     EARTH_RATE,
@@ -25,6 +25,7 @@ from strategies import random_quaternion, random_robot_file
 
 from space_robot_model.dynamics.algebra import vector as at_0
 from space_robot_model.dynamics.model import Data
+from space_robot_model.elementary.matrices import Array
 from space_robot_model.robot import Robot
 from space_robot_msgs_py.compiled.kernels import kernel
 from space_robot_msgs_py.errors import InputError
@@ -40,7 +41,6 @@ from space_robot_sim.environment.orbit import (
 )
 from space_robot_sim.plant.plant import Plant
 
-Array = NDArray[np.float64]
 POINT = rigid_robot(2.0, [1.0, 1.0, 1.0])
 FIELD = {"strength": 2.98e-5, "tilt_deg": 9.41, "pole_deg": -72.68}
 

@@ -12,8 +12,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
+from space_robot_model.elementary.matrices import Array
 from space_robot_model.robot import Robot
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.errors import FlightError
@@ -30,7 +30,6 @@ from space_robot_msgs_py.ros.loop import Level
 from space_robot_sim.plant import loop, outputs, pacing
 from space_robot_sim.plant.loop import ASK_AGAIN_S, PlantLoop
 
-Array = NDArray[np.float64]
 HOLD, DECIMATION, SILENCE_S = 30, 7, 1.0
 PERIOD = 5e-4
 STEP_S = 5e-6

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 from oracles import quaternion_of, rotation_of
 from oracles.momenta import momentum
 from oracles.orbit import (
@@ -36,6 +35,7 @@ from robots import (
 from scipy.spatial.transform import Rotation
 from strategies import random_quaternion, random_robot
 
+from space_robot_model.elementary.matrices import Array
 from space_robot_model.orbit.elements import state_of
 from space_robot_model.robot import Robot
 from space_robot_msgs_py.samples import RobotState
@@ -45,7 +45,6 @@ from space_robot_sim.environment.target import Target
 from space_robot_sim.plant.plant import Plant
 from space_robot_sim.plant.tick import REPORT_TICKS
 
-Array = NDArray[np.float64]
 ROBOT = Robot.from_yaml(CONFIG / "robots/paper.yaml")
 
 

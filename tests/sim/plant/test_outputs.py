@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from space_robot_model.elementary.matrices import Array
 from space_robot_model.robot import Robot
 from space_robot_model.robot.urdf_text import urdf_text
 from space_robot_msgs_py import topics
@@ -27,7 +27,6 @@ pytest.importorskip("rclpy")
 from space_robot_sim.plant import outputs
 from space_robot_sim.plant.outputs import BaseOutput
 
-Array = NDArray[np.float64]
 PERIOD, CHECK_EVERY_S = 5e-4, 0.02
 
 

@@ -9,13 +9,13 @@ import pytest
 from benches import WHEEL_AXES
 from hypothesis import given
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 from oracles import assert_close, rotation_of
 from oracles.momenta import kinetic_energy, momentum, state_of
 from oracles.rotors import RotorEquations, flown_settings, random_motor_rotors, random_rotors
 from robots import ANGLES_DEG, LOCKED, NO_FRICTION, PERIOD, plant_numbers, rigid_robot
 from strategies import random_gears, random_quaternion, random_robot, random_tree, with_gears
 
+from space_robot_model.elementary.matrices import Array
 from space_robot_model.robot import Robot
 from space_robot_msgs_py.compiled.records import assign
 from space_robot_msgs_py.errors import DivergedError
@@ -27,8 +27,6 @@ from space_robot_sim.environment.target import Target
 from space_robot_sim.plant.plant import Plant
 from space_robot_sim.plant.settings import PlantSettings
 from space_robot_sim.plant.tick import fastest_rate
-
-Array = NDArray[np.float64]
 
 
 def plant_of(robot: Robot, **settings: Any) -> Plant:

@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 from oracles.friction import solutions
 from oracles.momenta import kinetic_energy, momentum
 from robots import PERIOD, GearedFlight, oscillator
@@ -18,6 +17,7 @@ from scipy.integrate import quad
 from strategies import State, random_quaternion, random_robot, rotor_room, with_gears
 
 from space_robot_model.dynamics.model import Data
+from space_robot_model.elementary.matrices import Array
 from space_robot_model.robot import Robot
 from space_robot_model.robot.parts import Gear
 from space_robot_msgs_py.errors import InputError
@@ -29,7 +29,6 @@ from space_robot_sim.plant.mounting import STABLE, check_rotors, check_springs
 from space_robot_sim.plant.plant import Plant
 from space_robot_sim.plant.settings import PlantSettings
 
-Array = NDArray[np.float64]
 COULOMB = 0.7
 """N m; large beside the torques below, so that much sticks."""
 

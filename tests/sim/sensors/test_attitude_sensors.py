@@ -8,15 +8,13 @@ from benches import PERIOD, N, a_state
 from benches import SensorBench as Bench
 from hypothesis import given
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 from oracles import rotation_of
 from scipy.linalg import expm
 from scipy.spatial.transform import Rotation
 
+from space_robot_model.elementary.matrices import Array
 from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.samples import RobotState
-
-Array = NDArray[np.float64]
 
 
 def exact_covariance(sigma_v: float, sigma_u: float, period: float) -> Array:

@@ -8,13 +8,13 @@ from benches import PERIOD, N, a_state
 from benches import SensorBench as Bench
 from hypothesis import given
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 from oracles import rotation_of
 from random_samples import assert_same
 from robots import GearedFlight
 from scipy.stats import kstest
 from strategies import SEEDS, random_robot, rotor_room, with_gears
 
+from space_robot_model.elementary.matrices import Array
 from space_robot_model.hardware.sensors import EncoderSettings
 from space_robot_model.robot import Robot
 from space_robot_model.robot.parts import Encoder, Gear
@@ -138,7 +138,6 @@ def test_only_with_encoders_at_motors_the_measured_state_is_not_the_true_one(sid
     np.testing.assert_array_equal(state.numbers, truth.numbers)  # at rest nothing is stretched
 
 
-Array = NDArray[np.float64]
 FIELDS = {
     "gyro": "omega_base",
     "joint_position": "joint_positions",

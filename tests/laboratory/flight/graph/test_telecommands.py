@@ -12,16 +12,15 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from flights import PausedFlight
+from flights import PausedFlight, planned
 from telemetry_packets import check_equal
 
-from space_robot.flight.plan import Flight, Scenario, resolve
 from space_robot_msgs_py.bag.reader import read_flight
 from space_robot_msgs_py.telemetry.telecommands import FailureCode, functions, write_telecommand
 
 tc = pytest.importorskip("spacepackets.ecss.tc")
 APID, TIMEOUT_S = 100, 120.0
-FLIGHT = Flight(resolve(Scenario(actuators="wheels", duration=4.0)))
+FLIGHT = planned(actuators="wheels", duration=4.0)
 FUNCTIONS = {
     function.name: function for function in functions(FLIGHT.controller.names, tuple(FLIGHT.laws))
 }
