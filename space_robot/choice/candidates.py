@@ -9,7 +9,8 @@ from functools import partial
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+
+from space_robot_model.elementary.matrices import Array
 
 from ..analysis.words import Metrics, limit_cycles, with_statistic
 from ..campaign.row.fly import RowFlyer
@@ -21,8 +22,6 @@ from ..processes.executor import run_all
 from .criteria import CRITERIA, Criterion, is_error
 from .search_space import GainPoint
 from .trials import HELD, Score
-
-Array = NDArray[np.float64]
 
 OFTEN = 0.1
 """A law is out if a larger share of its flights has a limit cycle, or a joint beyond its effort."""
@@ -182,12 +181,12 @@ def comparisons(order: Sequence[FlownCandidate], criterion: Criterion) -> list[P
     """Compare the first candidate with each of the others over the same draws, by Holm's method."""
     first, *others = order
     own = first.values(criterion.value)
-    found = [
+    compared = [
         compare(own, other.values(criterion.value), law=first.law, other=other.law)
         for other in others
     ]
-    p_values = holm([each.p_better for each in found])
-    return [replace(c, p_better=p) for c, p in zip(found, p_values, strict=True)]
+    p_values = holm([each.p_better for each in compared])
+    return [replace(c, p_better=p) for c, p in zip(compared, p_values, strict=True)]
 
 
 def _fly(flyer: RowFlyer, criterion: str, tasks: Sequence[Task]) -> list[dict[str, float]]:

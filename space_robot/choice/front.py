@@ -20,13 +20,12 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+
+from space_robot_model.elementary.matrices import Array
 
 from .search_space import SearchSpace
 from .surrogate import Surrogates
 from .trials import ALLOWED_SATURATION, Score, Trials
-
-Array = NDArray[np.float64]
 
 RIPPLE_SHARES = (1.0, 0.3, 1.0, 0.1, 1.0, 3.0, 1.0, 1.0)
 """Ripples of a batch's gain sets, as shares of the one allowed."""

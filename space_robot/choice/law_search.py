@@ -10,9 +10,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from space_robot_control.laws import find_law, laws
+from space_robot_model.elementary.matrices import Array
 from space_robot_msgs_py.errors import InputError
 from space_robot_sim.environment.friction import coefficients
 
@@ -35,8 +35,6 @@ from .gain_files import write_gains
 from .search_space import GainPoint, SearchSpace
 from .start import first_points
 from .trials import Trials, Uncertainty
-
-Array = NDArray[np.float64]
 
 INITIAL_TUNING = TuningOptions(margin=0.05, mass_uncertainty=0.2)
 """Requirements on the gains from which the search starts."""

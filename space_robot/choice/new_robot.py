@@ -10,12 +10,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from space_robot_control.guidance.limits import MissionLimits
 from space_robot_control.guidance.mission import MissionSettings
 from space_robot_control.guidance.segments import read_segments
 from space_robot_control.laws import laws
+from space_robot_model.elementary.matrices import Array
 from space_robot_model.robot import Robot
 from space_robot_model.robot.description import unit_remarks
 from space_robot_model.robot.files import is_urdf, read_content
@@ -43,7 +43,6 @@ CHOICE = "choice"
 SHORT = ChoiceOptions(evaluations=48, trial_s=6.0, runs=6, is_short=True)
 """How the law is chosen: shorter than `space-robot choose` does."""
 
-Array = NDArray[np.float64]
 
 LEG_S = 10.0
 """The shortest duration of a leg, s."""

@@ -14,11 +14,9 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from space_robot_control.laws import ControlLaw
-
-Array = NDArray[np.float64]
+from space_robot_model.elementary.matrices import Array
 
 BASE_AXES = 3
 BASE, JOINTS = "base ", "joints "

@@ -10,13 +10,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-from numpy.typing import NDArray
+
+from space_robot_model.elementary.matrices import Array
 
 from ..tuning.estimate_design import K_1_FACTOR
 from ..tuning.method import Tuned
 from .search_space import BANDWIDTH, KNOWN, GainPoint
-
-Array = NDArray[np.float64]
 
 LEAST_BANDWIDTH = 2.0
 """rad/s."""

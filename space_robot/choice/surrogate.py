@@ -14,7 +14,8 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
+
+from space_robot_model.elementary.matrices import Array
 
 from .criteria import mean_log
 from .search_space import BASE, JOINTS, SearchSpace
@@ -23,7 +24,6 @@ from .trials import ALLOWED_SATURATION, Score
 if TYPE_CHECKING:
     from sklearn.gaussian_process import GaussianProcessRegressor
 
-Array = NDArray[np.float64]
 
 LENGTHS, NOISE = (0.05, 20.0), (1e-6, 0.1)
 """Bounds of the length scales (of the unit cube) and of the variance of the noise (of the

@@ -13,7 +13,6 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from space_robot_msgs_py.config.files import merge
 
@@ -26,8 +25,6 @@ from ..flight.plan import Flight
 from .criteria import Criterion, mean_log
 from .search_space import GainPoint
 from .stability import SmallMotions
-
-Array = NDArray[np.float64]
 
 ALLOWED_SATURATION = 0.01
 """Largest share of ticks with a wheel at its limit."""
