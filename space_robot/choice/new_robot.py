@@ -40,7 +40,7 @@ HELD_S = 5.0
 """The candidates fly the first leg, and this long after it, s."""
 CHOICE = "choice"
 """Folder of a longer choice by `space-robot choose`."""
-SHORT = ChoiceOptions(evaluations=48, trial_s=6.0, runs=6, is_short=True)
+SHORT = ChoiceOptions(evaluations=48, trial_s=6.0, runs=8, is_short=True)
 """How the law is chosen: shorter than `space-robot choose` does."""
 
 

@@ -161,7 +161,7 @@ def new() -> None:
     help="Roll, pitch, yaw of the arm's root on the satellite, degrees [default: 0,0,0].",
 )
 @click.option("--force", is_flag=True, help="Replace an older folder of this command.")
-@search_options(evaluations=48, runs=6)
+@search_options(evaluations=48, runs=8)
 @flight_options("json")
 @click.pass_context
 def new_robot(

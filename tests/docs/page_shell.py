@@ -34,7 +34,8 @@ SHORTER = {
     r"fly .*--scenario": "--help",  # a scenario is read before
     r"fly .*(kill|stop)_": "--duration {}",
     r"fly": "--composed --duration 0.2",
-    r"choose": "--law ctc --law pd --evaluations 2 --runs 2 --duration 1.1 --ripple 10 --workers 0",
+    r"choose": "--law ctc --law pd --evaluations 2 --runs 2 --duration 1.1 --ripple 10 --workers 0 "
+    "--actuators wheels",
     r"gains tune --law": "--evaluations 8 --ripple 10",
     r"new .*(--(force|passive)|geared)": "--help",  # tests/laboratory/cli/test_new_command.py
     r"new (robot )?\S+\.(urdf|yaml)": "--law ctc --law pd --evaluations 1 --runs 2 --workers 0",
