@@ -83,19 +83,18 @@ class FlownCandidate:
         count = len(self.flights)
         if ended := sum(not flight for flight in self.flights):
             return f"diverged in {ended} of {count} flights"
-        flown = self.flights
-        cycles = [text for flight in flown for text in limit_cycles(flight)]
+        cycles = [text for flight in self.flights for text in limit_cycles(flight)]
         if len(cycles) > OFTEN * count:
             return f"{cycles[0]} (in {len(cycles)} of {count} flights)"
-        beyond = sum(any(with_statistic(flight, "beyond_effort").values()) for flight in flown)
+        beyond = sum(any(with_statistic(f, "beyond_effort").values()) for f in self.flights)
         if beyond > OFTEN * count:
             return f"joints beyond their limits of effort in {beyond} of {count} flights"
-        share = float(np.median([flight.get("wheels.saturation", 0.0) for flight in flown]))
+        share = float(np.median([flight.get("wheels.saturation", 0.0) for flight in self.flights]))
         if share > MOST_SATURATION:
             return f"wheels at their limit in {share:.0%} of the ticks"
-        for name in with_statistic(flown[0], "standing"):
-            held = float(np.median([flight.get(f"{name}.standing", 0.0) for flight in flown]))
-            if held > HELD:
+        for name in with_statistic(self.flights[0], "standing"):
+            shares = [flight.get(f"{name}.standing", 0.0) for flight in self.flights]
+            if (held := float(np.median(shares))) > HELD:
                 return f"{name} held by friction on {held:.0%} of its way"
         return ""
 

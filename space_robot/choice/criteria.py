@@ -12,7 +12,7 @@ from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.errors import InputError
 
 from ..analysis.analysed_log import AnalysedLog
-from ..analysis.measure import evaluate, names
+from ..analysis.measure import evaluate, metric_group, names
 from ..analysis.words import Metrics
 
 
@@ -31,16 +31,20 @@ class Criterion(NamedTuple):
 
     def check(self, flight: AnalysedLog) -> None:
         """Raise `InputError` if a flight lacks numbers that count."""
-        known = [*names(flight, GROUPS)]
+        known = self._known(flight)
         for needed in (*self.errors, *self.metrics):
             if not any(fnmatchcase(name, needed) for name in known):
                 raise InputError(f"least {self.text}: this flight has no {needed}")
 
     def of(self, log: FlightLog) -> dict[str, float]:
         """Return the metrics of a complete flight that scores, reasons and this one need."""
-        flight, patterns = AnalysedLog(log), (*METRICS, *self.errors, *self.metrics)
-        known = [n for n in names(flight, GROUPS) if any(fnmatchcase(n, p) for p in patterns)]
-        return evaluate(flight, known)[0]
+        flight = AnalysedLog(log)
+        return evaluate(flight, self._known(flight))[0]
+
+    def _known(self, flight: AnalysedLog) -> list[str]:
+        patterns = (*METRICS, *self.errors, *self.metrics)
+        groups = dict.fromkeys(group.name for p in patterns if (group := metric_group(p)))
+        return [n for n in names(flight, groups) if any(fnmatchcase(n, p) for p in patterns)]
 
     def log_errors(self, metrics: Metrics) -> dict[str, float]:
         """Return the logarithm of each error that counts."""
@@ -92,8 +96,3 @@ METRICS = (
     *("wheels.saturation", "*.standing", "*.beyond_effort"),
 )
 """Patterns of the metrics that scores and reasons need."""
-GROUPS = (
-    *("errors", "end_effector", "torques", "roughness", "ripple", "wheel_saturation"),
-    *("standing", "beyond_limits"),
-)
-"""Groups of all these metrics."""

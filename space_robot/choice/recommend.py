@@ -126,17 +126,17 @@ def recommend(
     with ScratchFolder() as place:
         search, nominal, tuned = prepare(scenario, Path(place), options, command)
         fronts = {front.law: front for front in search.fronts()}
-        best = {f.law: tried for f in fronts.values() if (tried := f.within(options.ripple))}
-        out = {f.law: f.why_none(options.goal) for f in fronts.values() if f.law not in best}
-        by_error = sorted(best, key=lambda law: best[law].score.error)
-        for law in by_error[FEWEST:]:
-            if (ratio := best[law].score.error / best[by_error[0]].score.error) > FAR:
-                out[law] = f"{ratio:.3g} times the least error in trials"
         candidates = {
-            front.law: _candidates(search, name, front, Path(place))
+            front.law: own
             for name, front in zip(search.laws, fronts.values(), strict=True)
-            if front.law in best
+            if (own := _candidates(search, name, front, Path(place)))
         }
+        out = {f.law: f.why_none(options.goal) for f in fronts.values() if f.law not in candidates}
+        errors = {law: first.score.error for law, (first, *_) in candidates.items()}
+        by_error = sorted(errors, key=errors.__getitem__)
+        for law in by_error[FEWEST:]:
+            if (ratio := errors[law] / errors[by_error[0]]) > FAR:
+                out[law] = f"{ratio:.3g} times the least error in trials"
         study = candidates_study(scenario, nominal, options.uncertainty)
 
         def fly(some: Sequence[Candidate], runs: int, seed: int) -> list[FlownCandidate]:
@@ -148,11 +148,9 @@ def recommend(
 
         waiting = {law: iter(own) for law, own in candidates.items() if law not in out}
         by_law, order = select(waiting, fly, criterion, options.runs, options.seed)
-    flown = list(by_law.values())
-    out |= {each.law: each.reason for each in flown if each.reason}
-    for each in flown:
-        if each not in order and not each.reason:
-            out[each.law] = f"more than {criterion.near:g} times the least error"
+    flown, laws_ranked = list(by_law.values()), {each.law for each in order}
+    too_far = f"more than {criterion.near:g} times the least error"
+    out |= {each.law: each.reason or too_far for each in flown if each.law not in laws_ranked}
     write_set(tuned, command, folder / TUNED_SET)
     for law, (first, *_) in candidates.items():
         last = by_law[law].candidate if law in by_law else first

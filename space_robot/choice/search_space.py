@@ -290,7 +290,7 @@ def _fast_integral(gains: Mapping[str, Array]) -> Array:
 def _factor_per_gain(law: type[ControlLaw], gains: Mapping[str, Array]) -> list[Factor]:
     """Return a factor on each gain of a user's law, within the range that it declares."""
     factors = []
-    for name in gains:
+    for name in (name for name, values in gains.items() if values.any()):
         declared = law.gain_ranges().get(name)
         if declared and not declared.per_inertia:
             low, high = max(declared.lower, 1e-3 * declared.upper), declared.upper

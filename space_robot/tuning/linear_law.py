@@ -102,12 +102,13 @@ def linear_laws(
 
     One without nominal inertia is computed in the first and the last; if equal, it is in all.
     """
-    first, last = (linear_law(law, postures[index], inertia_scale) for index in (0, -1))
-    pairs = [(first.force_by[name], last.force_by[name]) for name in INPUTS]
+    outer = postures[:: max(1, len(postures) - 1)]
+    first, *last = (linear_law(law, posture, inertia_scale) for posture in outer)
+    pairs = [(first.force_by[name], own.force_by[name]) for own in last for name in INPUTS]
     if not law.needs_model and all(np.allclose(*pair, rtol=1e-5) for pair in pairs):
         return [first] * len(postures)
     inner = [linear_law(law, posture, inertia_scale) for posture in postures[1:-1]]
-    return [first, *inner, last][: len(postures)]
+    return [first, *inner, *last]
 
 
 def _influential(step: Array, by_input: Array, force_by_state: Array) -> Sequence[int]:

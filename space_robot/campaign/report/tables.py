@@ -320,13 +320,16 @@ def sobol_tables(findings: Findings) -> list[Table]:
     for each in findings.sobol:
         left_out = f"; {each.left_out} with failed flights left out" if each.left_out else ""
         title = f"Sobol indices, {each.law}, {each.metric}: {each.rows} rows of the design"
-        pairs = [(i.variable, i.first, i.total) for i in each.indices[:STRONGEST]]
         rows = [
-            [name, *(t for e in both for t in (f"{e.value:.3f}", span(e, ".3f")))]
-            for name, *both in pairs
+            [i.variable, *(text for e in (i.first, i.total) for text in _index(e))]
+            for i in each.indices[:STRONGEST]
         ]
         tables.append(Table.of(title + left_out, columns, rows))
     return tables
+
+
+def _index(estimate: Estimate) -> tuple[str, str]:
+    return f"{estimate.value:.3f}", span(estimate, ".3f")
 
 
 def worst_table(findings: Findings, point: GridPoint, quantity: Quantity, law: str = "") -> Table:
