@@ -142,7 +142,7 @@ def recommend(
         def fly(some: Sequence[Candidate], runs: int, seed: int) -> list[FlownCandidate]:
             for each in some:
                 write_gains(each.controller, each.gains, Path(each.folder), command, each.score)
-            with counting_progress("flights of the candidates") as begin:
+            with counting_progress("batches of flights of the candidates") as begin:
                 how = options.criterion, runs, seed, options.workers, begin
                 return fly_candidates(study, some, *how)
 

@@ -229,9 +229,10 @@ def new_robot(
     own = laws or SHORT.laws
     options = replace(SHORT, laws=own, evaluations=evaluations, runs=runs, workers=workers)
     made = make_robot(texts, read, folder, command, options)
-    said = f"made {folder}/: `space-robot fly --robot {folder}/` flies it"
+    said = f"made {folder}/"
     if made.choice.law:
-        said += f", `space-robot campaign run {folder}/{CAMPAIGN_FILE}` the best laws in more draws"
+        said += f": `space-robot fly --robot {folder}/` flies it, "
+        said += f"`space-robot campaign run {folder}/{CAMPAIGN_FILE}` the best laws in more draws"
     click.echo(said, err=True)
     if as_json:
         echo_json(made.report())
