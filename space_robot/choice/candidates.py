@@ -30,7 +30,7 @@ MOST_SATURATION = 0.05
 GROUP = 8
 """Flights that a process takes at a time."""
 CONFIRMING = 3
-"""So many times the draws does the first law fly further ones: few miss a rare limit cycle."""
+"""Factor on the draws in which the best law is checked; few draws miss rare limit cycles."""
 
 
 class Candidate(NamedTuple):
@@ -149,7 +149,7 @@ def select(
 ) -> tuple[dict[str, FlownCandidate], list[FlownCandidate]]:
     """Fly candidates of all laws, with the next gains of a law while it is out.
 
-    The first of those that are not out must not be so in further draws either.
+    The best of those that are not out must pass `CONFIRMING` times as many new draws, too.
 
     Args:
         waiting: candidates of each law, the preferred one first.

@@ -32,7 +32,7 @@ RIPPLE_SHARES = (1.0, 0.3, 1.0, 0.1, 1.0, 3.0, 1.0, 1.0)
 BATCH = 8
 """Gain sets of a batch: two batches of lanes, with two trials each."""
 FIRST_DESIGN = 0.2
-"""Share of the gain sets that is not proposed by the surrogates."""
+"""Share of the gain sets, two batches or more, that the surrogates do not propose."""
 FIRST_SPREAD = 0.2
 """Standard deviation of the first design around the best of the start; a third is over all."""
 LONGEST, SHORTEST = 0.4, 0.05

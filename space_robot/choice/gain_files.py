@@ -61,14 +61,12 @@ def install(files: Sequence[Path], set_file: Path, law: str, gains: Path) -> Pat
     """
     folder = gains / CHOSEN
     make_folder(folder)
+    for older in folder.glob("*.yaml"):  # the set has one low-pass, perhaps another one now
+        older.unlink()
     for file in files:
         write_text(file.read_text("utf-8"), folder / file.name, replace=True)
-    text = set_file.read_text("utf-8")
-    write_text(
-        f"{text}    controller: {law}  # flown unless another is named\n",
-        folder / SET_FILE,
-        replace=True,
-    )
+    line = f"    controller: {law}  # flown unless another is named\n"
+    write_text(set_file.read_text("utf-8") + line, folder / SET_FILE, replace=True)
     make_default(CHOSEN, gains)
     return folder
 

@@ -23,6 +23,7 @@ from ..campaign.gain_set import tuned_set, write_set
 from ..campaign.study import Law
 from ..console.progress import watching_progress
 from ..flight.flown_log import empty_log
+from ..flight.mission_demand import demand_complaint
 from ..flight.plan import Flight, resolve
 from ..processes.executor import run_all
 from ..processes.scratch_folder import ScratchFolder
@@ -44,7 +45,7 @@ WITHOUT_PAYLOAD = "1"
 FAST, LONGEST_TRIAL_S = 0.6, 40.0
 """Share of the largest speed that is fast; the longest trial, s."""
 TUNED_SET = "tuned"
-"""Name of the set from which the search starts."""
+"""Name of the set from which `first_points` starts the search."""
 TUNED = ("robot", "mission", "sensors", "navigation", "orbit", "period", "parameters")
 """Options of a scenario that gains are tuned for."""
 
@@ -60,7 +61,7 @@ class ChoiceOptions:
     laws: tuple[str, ...] = ()
     """That take part, also ``file.py:Class``; empty: all of this project."""
     evaluations: int = 80
-    """Gain sets tried for each law."""
+    """Gain sets flown for each law."""
     is_short: bool = False
     """Whether few numbers of each law are searched, at the ripple allowed only."""
     trial_s: float = 12.0
@@ -118,6 +119,8 @@ def prepare(
     friction = coefficients(known, nominal.plant_settings.friction)[: known.n]
     if (duration := nominal.ticks * nominal.period) < SHORTEST_S:
         raise InputError(f"a search needs {SHORTEST_S:g} s of flight or more, got {duration:g} s")
+    if complaint := demand_complaint(nominal.scenario, duration):
+        raise InputError(f"no law can fly this: {complaint}: use `space-robot plan` to stretch it")
     log = AnalysedLog(empty_log(nominal, 0, 1, is_brief=True))
     CRITERIA[options.criterion].check(log)
     peak = force_demand(known, nominal.scenario.mission, [nominal.scenario.plant]).peak

@@ -135,7 +135,7 @@ class NewRobot:
     mission: MissionSettings
     choice: Recommendation
     remarks: tuple[str, ...] = ()
-    """Remarks on weak laws, on tools and joints that may be passive, in sentences."""
+    """Remarks on units, tools and joints that may be passive, in sentences."""
 
     @property
     def duration(self) -> float:

@@ -99,9 +99,9 @@ class Recommendation:
             law, searched = tuned.stem, folder / tuned.stem / tuned.name
             if tuned.name == SET_FILE:
                 continue
-            if law == self.law or (law in own and not has_estimate(law)):
-                files.append(searched)
-            elif not has_estimate(law) or set_folder.name == TUNED_SET:
+            if not has_estimate(law):
+                files.append(searched if law in own else tuned)
+            elif set_folder.name == TUNED_SET:
                 files.append(tuned)
             elif own.get(law) == own[self.law]:
                 files.append(searched)

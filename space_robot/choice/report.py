@@ -22,8 +22,8 @@ from ..processes.software import versions
 from .criteria import CRITERIA
 from .front import Front
 from .recommend import Recommendation
+from .robot_files import CAMPAIGN_FILE
 
-CAMPAIGN = "campaign.yaml"
 CAMPAIGN_LAWS, CAMPAIGN_RUNS = 4, 200
 """Laws and runs of the campaign that continues the comparison."""
 
@@ -94,9 +94,7 @@ def report(choice: Recommendation) -> dict[str, Any]:
             for c in choice.compared
         ],
         "fronts": {
-            law: [
-                {"ripple": tried.score.ripple, "error": tried.score.error} for tried in front.best
-            ]
+            law: [{"ripple": t.score.ripple, "error": t.score.error} for t in front.best]
             for law, front in choice.fronts.items()
         },
         "versions": versions(),
@@ -107,12 +105,8 @@ def campaign_text(choice: Recommendation, folder: Path, command: str) -> str:
     """Return a campaign of the best laws, which continues the comparison."""
     best = choice.order[:CAMPAIGN_LAWS]
     laws = [f"{each.candidate.controller}={folder / each.law}/" for each in best]
-    study = {
-        "scenario": dict(choice.scenario),
-        "laws": laws,
-        "vary": choice.vary,
-        "runs": CAMPAIGN_RUNS,
-    }
+    scenario = dict(choice.scenario)
+    study = {"scenario": scenario, "laws": laws, "vary": choice.vary, "runs": CAMPAIGN_RUNS}
     head = f"# Made by `{command}`: the best laws, each with its gains, over more draws.\n"
     return head + yaml.safe_dump(study, sort_keys=False, allow_unicode=True, width=100)
 
@@ -173,7 +167,7 @@ def write_report(choice: Recommendation, folder: Path, command: str) -> Path:
     )
     write_text(text, folder / "index.html", replace=True)
     write_text(json_text(report(choice)), folder / "choice.json", replace=True)
-    (folder / CAMPAIGN).unlink(missing_ok=True)  # of an earlier choice
+    (folder / CAMPAIGN_FILE).unlink(missing_ok=True)  # of an earlier choice
     if choice.order:
-        write_text(campaign_text(choice, folder, command), folder / CAMPAIGN)
+        write_text(campaign_text(choice, folder, command), folder / CAMPAIGN_FILE)
     return folder / "index.html"

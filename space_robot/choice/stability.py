@@ -17,7 +17,7 @@ from ..tuning.inertia import inertia_along, postures_along
 from ..tuning.linear_law import linear_laws
 
 POSTURES = 6
-"""In which the loop is closed, spread over the mission."""
+"""Parts of the mission; the loop is closed at the ends of each."""
 
 
 class SmallMotions:

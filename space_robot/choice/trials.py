@@ -1,8 +1,8 @@
 """Trial flights of a gain set: the mission's beginning, with a light and a heavy robot.
 
 The two differ from the nominal flight in everything that a gain set needs margin for, each in the
-direction in which errors add up: the light robot's loop is the fastest, that of the heavy robot
-has the least share of the force that an estimate counts on.
+direction in which errors add up: the light robot's loop is the fastest, and its drives report less
+torque than they apply; those of the heavy robot report more.
 """
 
 from __future__ import annotations
@@ -96,7 +96,7 @@ class Score(NamedTuple):
     """What the trials of a gain set showed."""
 
     error: float
-    """By the criterion."""
+    """Mean of `errors`, see `mean_log`."""
     ripple: float
     """Largest ripple of a group of torques, as a share of its largest torque in the mission."""
     saturation: float

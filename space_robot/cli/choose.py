@@ -30,7 +30,7 @@ def search_options(evaluations: int, runs: int) -> Decorator:
             type=click.IntRange(1, 100_000),
             default=evaluations,
             show_default=True,
-            help="Gain sets to try for each law; 1: the tuned one alone.",
+            help="Gain sets to fly for each law; 1: the first one alone.",
         ),
         click.option(
             "--runs",
@@ -106,7 +106,8 @@ def choose(
 
     from ..choice import ChoiceOptions, Uncertainty, recommend
     from ..choice.new_robot import CHOICE
-    from ..choice.report import CAMPAIGN, candidates_table, report, write_report
+    from ..choice.report import candidates_table, report, write_report
+    from ..choice.robot_files import CAMPAIGN_FILE
     from ..console.terminal import echo_json, print_table, terminal
     from ..flight.compilation import compile_lanes
     from ..processes.executor import cores
@@ -129,6 +130,8 @@ def choose(
     is_own = files.gains == own_folder / OWN_GAINS
     folder = out or (own_folder / CHOICE if is_own else Path("choices") / files.name)
     command = shlex.join(["space-robot", "choose", *context.meta[WORDS]])
+    if scenario.get("sensors", "ideal") == "ideal":
+        click.echo("warning: ideal sensors, see --sensors fine --navigation filtered", err=True)
     compile_lanes()
     choice = recommend(scenario, folder, wanted, command)
     page = write_report(choice, folder, command)
@@ -148,4 +151,4 @@ def choose(
     click.echo(f"{page} has the fronts", err=True)
     if not choice.law:
         raise SpaceRobotError(f"no law flies {robot}: see the table")
-    click.echo(f"{folder / CAMPAIGN} goes on with the best laws", err=True)
+    click.echo(f"{folder / CAMPAIGN_FILE} goes on with the best laws", err=True)

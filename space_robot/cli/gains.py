@@ -114,8 +114,8 @@ class TypedCommand(click.Command):
     "--error",
     type=FiniteRange(0.0, 10.0, min_open=True),
     metavar="ERROR",
-    help="With --law: least ripple with at most this mean of the RMS errors of attitude and "
-    "joints, rad and m.",
+    help="With --law: least ripple with at most this geometric mean of the RMS errors of attitude, "
+    "degrees, and joints, rad or m.",
 )
 @click.option(
     "--bandwidth",

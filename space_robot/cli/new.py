@@ -104,7 +104,7 @@ def new() -> None:
 
     \b
     Examples:
-      space-robot new my.urdf                 model, mission, gains for all laws; a first flight
+      space-robot new my.urdf                 model, mission, the best law and its gains
       space-robot new law my_law              a control law with its gains
       space-robot new sensor my_sensors       sensors, with the numbers of data sheets
       space-robot new metric overshoot        a number of a flight, for analyze and campaigns
@@ -112,7 +112,7 @@ def new() -> None:
     """
 
 
-@new.command("robot", cls=TypedCommand, short_help="Make a folder for a robot, and fly it.")
+@new.command("robot", cls=TypedCommand, short_help="Make a folder for a robot, and choose its law.")
 @click.argument("robot", shell_complete=names_in("robots"))
 @click.option(
     "--out",

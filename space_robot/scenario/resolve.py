@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 
+import numpy as np
+
 from space_robot_control.allocation.settings import assumed_actuators
 from space_robot_control.controller.gains import Laws
 from space_robot_control.controller.law_choice import NoLaw, parse_swaps
@@ -15,8 +17,9 @@ from space_robot_control.laws import laws as known_laws
 from space_robot_model.hardware.base_actuators import BaseActuatorSettings
 from space_robot_model.robot import Robot
 from space_robot_model.robot.find import TRAJECTORIES, YAML, remake_advice, robot_files
+from space_robot_model.robot.inertia import inertia_tensor
 from space_robot_msgs_py.config.files import GIVEN, flatten, nest
-from space_robot_msgs_py.config.validation import one_of, validate
+from space_robot_msgs_py.config.validation import one_of, short, validate
 from space_robot_msgs_py.errors import InputError, explained_by
 from space_robot_sim.environment.disturbance_table import JSON, DisturbanceTable
 from space_robot_sim.faults.grammar import Fault, parse_faults
@@ -54,6 +57,7 @@ def resolve(scenario: Scenario) -> ResolvedScenario:
         assumed_actuators=software_actuators(scenario, settings),
         process_faults=faults,
     )
+    _check_payload(resolved)
     _check_disturbance(resolved)
     _check_actuators(resolved)
     return _with_sampled_disturbance(resolved) if callable(scenario.disturbance) else resolved
@@ -138,6 +142,20 @@ def software_actuators(scenario: Scenario, settings: FlightSettings) -> BaseActu
     assumed = validate(BaseActuatorSettings, own, option)
     assumed.check(robot, GIVEN if option == "actuators" else f"{GIVEN} as {option}")
     return assumed
+
+
+@explained_by("disturbances")
+def _check_payload(scenario: ResolvedScenario) -> None:
+    payload, robot, case = scenario.plant.payload, scenario.robots.controller, scenario.options.case
+    mass, inertia = robot.mass[robot.tool.body], robot.inertia[robot.tool.body]
+    gained = np.linalg.eigvalsh(inertia_tensor(payload.inertia) - inertia)
+    if payload.mass and (payload.mass < mass or gained[0] < -1e-9):
+        without = f"{mass:g} kg, {short(np.diag(inertia).tolist())} kg m2"
+        raise InputError(
+            f"case {case}: with its payload the last link has {payload.mass:g} kg and "
+            f"{short(payload.inertia[:3])} kg m2, less than without it ({without}): "
+            f"write a case for {robot.name}, or fly case 2"
+        )
 
 
 @explained_by("disturbances")

@@ -11,8 +11,7 @@ from gymnasium.utils.env_checker import check_env
 from gymnasium.wrappers import PassiveEnvChecker
 
 from space_robot import Scenario
-from space_robot.api.gymnasium_env import NAME, SpaceRobotEnv
-from space_robot.learning.reach import WORST_COST
+from space_robot.api.gymnasium_env import NAME, WORST_COST, SpaceRobotEnv
 from space_robot_model.elementary.matrices import Array
 from space_robot_msgs_py.errors import InputError
 
