@@ -124,15 +124,15 @@ def evidence(name: str, folder: Path, seed: int) -> dict[str, Any]:
     """Choose, fly the other draws, and return what came of both."""
     scenario = scenario_of(name, folder)
     options = ChoiceOptions(seed=seed, workers=cores())
-    begun = time.monotonic()
-    choice = recommend(scenario, folder / f"{name}.{seed}", options, COMMAND)
+    begun, own = time.monotonic(), folder / f"{name}.{seed}"
+    choice = recommend(scenario, own, options, COMMAND)
     seconds = time.monotonic() - begun
     criterion = CRITERIA[options.criterion]
     nominal = Scenario(**scenario).check()
     study = candidates_study(scenario, nominal, options.uncertainty)
-    candidates = [each.candidate for each in choice.order[:MOST]]
+    candidates = [each.candidate._replace(folder=f"{own / each.law}/") for each in choice.order]
     how = options.criterion, DRAWS, OTHER_SEED, options.workers
-    flown = fly_candidates(study, candidates, *how)
+    flown = fly_candidates(study, candidates[:MOST], *how)
     order = ranked(flown, criterion)
     chosen = [each for each in flown if each.law == choice.law]
     others = [each for each in order if each.law != choice.law]

@@ -17,7 +17,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -45,6 +45,11 @@ CANDIDATES, ROUNDS = 400, 4
 """Points from which a proposal is chosen, and rounds, each in half the region of the last."""
 
 
+WEIGHT = 3.0
+"""Powers of the error that a factor on the ripple is worth while no gain set is within its bound:
+ripple alone would lead to gains that hardly control."""
+
+
 class Goal(NamedTuple):
     """The place on a front that a search is for."""
 
@@ -52,6 +57,12 @@ class Goal(NamedTuple):
     """Least error with at most this ripple, a share of the largest torque."""
     error: float | None = None
     """If set: least ripple with at most this error."""
+
+    def split(self, error: Any, ripple: Any) -> tuple[Any, Any]:
+        """Return what is minimised, and what is bounded less its bound, of logarithms."""
+        if self.error is not None:
+            return ripple, error - math.log(self.error)
+        return error, ripple - math.log(self.ripple)
 
 
 class Tried(NamedTuple):
@@ -92,11 +103,13 @@ class Front:
         """Return the gain set of a goal, else the one that lacks least for it."""
         if chosen := self.chosen(goal):
             return chosen
-        if self.best:
-            return self.best[0 if goal.error is None else -1]
-        return min(
-            self.tried, key=lambda t: (max(0.0, t.score.growth), -t.score.flown, t.score.ripple)
-        )
+
+        def lack(tried: Tried) -> tuple[float, ...]:
+            score = tried.score
+            far = _lack(*goal.split(*np.log(score[:2]))) if score.flown >= 1.0 else 0.0
+            return max(0.0, score.growth), -score.flown, far
+
+        return min(self.best or self.tried, key=lack)
 
     @property
     def flown(self) -> int:
@@ -176,7 +189,8 @@ def search_front(
             if goal.error is not None:
                 own = goal._replace(error=goal.error / share)
             known = np.vstack([front.nearest(own).point, points])
-            proposed.append(_propose(surrogates, known, own, length, random))
+            reach = length if number or part > LAST_PART else 1.0
+            proposed.append(_propose(surrogates, known, own, reach, random))
         fly(proposed)
     return front
 
@@ -192,6 +206,11 @@ def _around(best: Array, count: int, random: np.random.Generator) -> list[Array]
     return list(np.where(np.arange(count)[:, None] % 3 < 2, near, spread))
 
 
+def _lack(value: Any, excess: Any) -> Any:
+    """Return how far gain sets beyond the bound are from a goal, of logarithms."""
+    return value + WEIGHT * excess
+
+
 def _propose(
     surrogates: Surrogates, known: Array, goal: Goal, length: float, random: np.random.Generator
 ) -> Array:
@@ -205,10 +224,10 @@ def _propose(
         near = best + half * random.uniform(-1.0, 1.0, shape)
         points = np.clip(np.vstack([best, near, points]), 0.0, 1.0)
         error, ripple = surrogates.predict(points, deviations)
-        value, bounded, bound = error, ripple, math.log(goal.ripple)
-        if goal.error is not None:
-            value, bounded, bound = ripple, error, math.log(goal.error)
-        allowed = np.flatnonzero(bounded <= bound)
-        best = points[allowed[np.argmin(value[allowed])] if len(allowed) else np.argmin(bounded)]
+        value, excess = goal.split(error, ripple)
+        allowed = np.flatnonzero(excess <= 0.0)
+        best = points[
+            allowed[np.argmin(value[allowed])] if len(allowed) else np.argmin(_lack(value, excess))
+        ]
         points = points[:0]
     return best

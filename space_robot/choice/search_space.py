@@ -63,10 +63,15 @@ FILTER = "low-pass of the estimate"
 """The one factor on a number of the set instead of a law's: its corner frequency."""
 SLOWEST_HZ, FASTEST_HZ = 1.0, 900.0
 """Corner frequencies of low-passes between which is searched."""
-FIRST_HZ, FIRST_RAD_S = (30.0, 6.0, 1.2), (2.0, 8.0, 32.0)
-"""Low-passes and bandwidths with which the search begins."""
-WITHOUT_LOW_PASS = (1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0, 128.0)
-"""Bandwidths with which it does for laws without one."""
+FIRST_HZ = (30.0, 6.0, 1.2)
+"""Low-passes with which the search begins."""
+FIRST_RAD_S: Sequence[tuple[float, float]] = ((2.0, 2.0), (8.0, 8.0), (32.0, 32.0))
+"""Bandwidths of base and joints with which the search begins."""
+WITHOUT_LOW_PASS: Sequence[tuple[float, float]] = (
+    *((1.0, 1.0), (4.0, 4.0), (16.0, 16.0), (64.0, 64.0)),
+    *((1.0, 8.0), (4.0, 32.0), (16.0, 128.0), (64.0, 200.0)),
+)
+"""Those with which it does for laws without a low-pass."""
 AGAINST_FRICTION = (INTEGRAL, FRICTION, DEAD_BAND)
 KNOWN: Mapping[str, Sequence[Factor]] = {
     "pd": [bandwidth(k_p=2, k_d=1), DAMPING, *AGAINST_FRICTION],
@@ -242,18 +247,21 @@ class SearchSpace:
     @property
     def ladder(self) -> list[Array]:
         """The start with low-passes and bandwidths of all kinds."""
-        labels = [coordinate.label for coordinate in self.coordinates]
-        is_fast = np.array([label.endswith(f" {BANDWIDTH}") for label in labels])
+        is_rate = [
+            np.array([coordinate.label == part + BANDWIDTH for coordinate in self.coordinates])
+            for part in (BASE, JOINTS)
+        ]
         is_low_pass = np.array([coordinate.is_low_pass for coordinate in self.coordinates])
         has_low_pass = bool(is_low_pass.any())
         corners = _shares(FIRST_HZ, SLOWEST_HZ, FASTEST_HZ) if has_low_pass else [0.0]
-        rates: Sequence[float] = FIRST_RAD_S if has_low_pass else WITHOUT_LOW_PASS
-        if not is_fast.any() or not self.start.bandwidth:
-            is_fast, rates = np.zeros_like(is_fast), rates[:1]
+        rates = FIRST_RAD_S if has_low_pass else WITHOUT_LOW_PASS
+        if not np.any(is_rate) or not self.start.bandwidth:
+            is_rate, rates = [np.zeros_like(is_low_pass)] * 2, rates[:1]
+        shares = [_shares(both, SLOWEST_RAD_S, FASTEST_RAD_S) for both in rates]
         return [
-            np.where(is_fast, rate, np.where(is_low_pass, corner, self.origin))
+            np.select([*is_rate, is_low_pass], [*both, corner], self.origin)
             for corner in corners
-            for rate in _shares(rates, SLOWEST_RAD_S, FASTEST_RAD_S)
+            for both in shares
         ]
 
     def at(self, point: Array) -> GainPoint:
