@@ -43,11 +43,9 @@ MOST_UNSTABLE = 3
 """Most gain sets tried, with those that are not flown, relative to the number to fly."""
 CANDIDATES, ROUNDS = 400, 4
 """Points from which a proposal is chosen, and rounds, each in half the region of the last."""
-
-
-WEIGHT = 3.0
-"""Powers of the error that a factor on the ripple is worth while no gain set is within its bound:
-ripple alone would lead to gains that hardly control."""
+OUTSIDE, WEIGHT = 1e3, 3.0
+"""What is added to the logarithm of an error if the ripple is beyond its bound, and how much the
+ripple's counts there: by ripple alone the search would end at gains that hardly control."""
 
 
 class Goal(NamedTuple):
@@ -58,11 +56,12 @@ class Goal(NamedTuple):
     error: float | None = None
     """If set: least ripple with at most this error."""
 
-    def split(self, error: Any, ripple: Any) -> tuple[Any, Any]:
-        """Return what is minimised, and what is bounded less its bound, of logarithms."""
+    def cost(self, error: Any, ripple: Any) -> Any:
+        """Return what is least at the place, of logarithms."""
+        value, excess = error, ripple - math.log(self.ripple)
         if self.error is not None:
-            return ripple, error - math.log(self.error)
-        return error, ripple - math.log(self.ripple)
+            value, excess = ripple, error - math.log(self.error)
+        return value + np.where(excess > 0.0, OUTSIDE + WEIGHT * excess, 0.0)
 
 
 class Tried(NamedTuple):
@@ -101,15 +100,12 @@ class Front:
 
     def nearest(self, goal: Goal) -> Tried:
         """Return the gain set of a goal, else the one that lacks least for it."""
-        if chosen := self.chosen(goal):
-            return chosen
 
-        def lack(tried: Tried) -> tuple[float, ...]:
+        def cost(tried: Tried) -> tuple[float, ...]:
             score = tried.score
-            far = _lack(*goal.split(*np.log(score[:2]))) if score.flown >= 1.0 else 0.0
-            return max(0.0, score.growth), -score.flown, far
+            return max(0.0, score.growth), -score.flown, goal.cost(*np.log(score[:2]))
 
-        return min(self.best or self.tried, key=lack)
+        return min(self.best or self.tried, key=cost)
 
     @property
     def flown(self) -> int:
@@ -206,11 +202,6 @@ def _around(best: Array, count: int, random: np.random.Generator) -> list[Array]
     return list(np.where(np.arange(count)[:, None] % 3 < 2, near, spread))
 
 
-def _lack(value: Any, excess: Any) -> Any:
-    """Return how far gain sets beyond the bound are from a goal, of logarithms."""
-    return value + WEIGHT * excess
-
-
 def _propose(
     surrogates: Surrogates, known: Array, goal: Goal, length: float, random: np.random.Generator
 ) -> Array:
@@ -223,11 +214,6 @@ def _propose(
     for half in length * 0.5 ** np.arange(ROUNDS):
         near = best + half * random.uniform(-1.0, 1.0, shape)
         points = np.clip(np.vstack([best, near, points]), 0.0, 1.0)
-        error, ripple = surrogates.predict(points, deviations)
-        value, excess = goal.split(error, ripple)
-        allowed = np.flatnonzero(excess <= 0.0)
-        best = points[
-            allowed[np.argmin(value[allowed])] if len(allowed) else np.argmin(_lack(value, excess))
-        ]
+        best = points[np.argmin(goal.cost(*surrogates.predict(points, deviations)))]
         points = points[:0]
     return best

@@ -48,13 +48,8 @@ def candidates_table(choice: Recommendation, notes: Sequence[str] = ()) -> Table
             word = {"better": "worse", "worse": "better"}.get(comparisons[law].finding, "alike")
             verdict = JudgedCell(f"{1.0 / comparisons[law].ratio.value:.3g} times,", word, "open")
         rows.append([order.get(law), law, value, ripple, verdict])
-    columns = [
-        Column("rank", "", "d"),
-        Column("law", is_label=True),
-        Column("median", "", ".3g"),
-        Column("ripple", "%", ".2g"),
-        Column("beside the first", is_label=True),
-    ]
+    columns = [Column("rank", "", "d"), Column("law", is_label=True), Column("median", "", ".3g")]
+    columns += [Column("ripple", "%", ".2g"), Column("beside the first", is_label=True)]
     title = f"{criterion.text}, {choice.options.runs} draws"
     return Table(title, columns, [Group(rows)], notes)
 
@@ -155,12 +150,11 @@ def write_report(choice: Recommendation, folder: Path, command: str) -> Path:
     make_folder(folder)
     with house_style():
         files = save_figure(fronts_figure(choice.fronts, choice.law), folder / "fronts")
-    figure = SavedFigure("Error against ripple: the fronts of the laws", files)
     text = template("space_robot.choice", "choice.html.j2").render(
         robot=str(choice.scenario.get("robot", "paper")),
         sentence=choice.sentence,
         tables=[candidates_table(choice)],
-        figure=figure,
+        figure=SavedFigure("Error against ripple: the fronts of the laws", files),
         scenario=yaml.safe_dump(dict(choice.scenario), sort_keys=False),
         options=choice.options,
         command=command,

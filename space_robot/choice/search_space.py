@@ -247,10 +247,8 @@ class SearchSpace:
     @property
     def ladder(self) -> list[Array]:
         """The start with low-passes and bandwidths of all kinds."""
-        is_rate = [
-            np.array([coordinate.label == part + BANDWIDTH for coordinate in self.coordinates])
-            for part in (BASE, JOINTS)
-        ]
+        labels = np.array([coordinate.label for coordinate in self.coordinates], str)
+        is_rate = [labels == part + BANDWIDTH for part in (BASE, JOINTS)]
         is_low_pass = np.array([coordinate.is_low_pass for coordinate in self.coordinates])
         has_low_pass = bool(is_low_pass.any())
         corners = _shares(FIRST_HZ, SLOWEST_HZ, FASTEST_HZ) if has_low_pass else [0.0]

@@ -169,12 +169,11 @@ class Trials:
             else {"flown": 1.0, **self._criterion.of(flown.log)}
             for flight, flown in zip(flights, fly_in_lanes(flights), strict=True)
         )
-        return [
-            self._score([next(trials) for _ in self._variations])._replace(growth=fastest)
-            if fastest <= 0.0
-            else Score(math.inf, math.inf, 0.0, 0.0, False, {}, growth=fastest)
+        flown = [
+            [next(trials) if fastest <= 0.0 else {"flown": 0.0} for _ in self._variations]
             for fastest in growth
         ]
+        return [self._score(f)._replace(growth=g) for f, g in zip(flown, growth, strict=True)]
 
     def _growth(self, point: GainPoint) -> float:
         law = type(self.law)(dict(point.gains), self.law.period)

@@ -114,13 +114,10 @@ def choose(
 
     wanted = ChoiceOptions(
         criterion=criterion,
-        ripple=options.pop("ripple"),
         laws=laws,
-        evaluations=options.pop("evaluations"),
-        runs=options.pop("runs"),
-        seed=options.pop("seed"),
         workers=cores() if workers is None else workers,
         uncertainty=Uncertainty(mass=mass_uncertainty),
+        **{name: options.pop(name) for name in ("ripple", "evaluations", "runs", "seed")},
     )
     scenario = {"robot": robot_as_path(robot)} | {
         name: value for name, value in options.items() if value not in (None, {}, "")
@@ -135,9 +132,8 @@ def choose(
     compile_lanes()
     choice = recommend(scenario, folder, wanted, command)
     page = write_report(choice, folder, command)
-    chosen = None
-    if is_own and choice.law in shipped_laws():
-        chosen = choice.install(folder, own_folder / OWN_GAINS)
+    is_default = is_own and choice.law in shipped_laws()
+    chosen = choice.install(folder, own_folder / OWN_GAINS) if is_default else None
     if as_json:
         echo_json(report(choice))
     else:

@@ -150,11 +150,11 @@ def _check_payload(scenario: ResolvedScenario) -> None:
     mass, inertia = robot.mass[robot.tool.body], robot.inertia[robot.tool.body]
     gained = np.linalg.eigvalsh(inertia_tensor(payload.inertia) - inertia)
     if payload.mass and (payload.mass < mass or gained[0] < -1e-9):
-        without = f"{mass:g} kg, {short(np.diag(inertia).tolist())} kg m2"
+        own = f"{mass:g} kg, {short(np.diag(inertia).tolist())} kg m2"
         raise InputError(
             f"case {case}: with its payload the last link has {payload.mass:g} kg and "
-            f"{short(payload.inertia[:3])} kg m2, less than without it ({without}): "
-            f"write a case for {robot.name}, or fly case 2"
+            f"{short(payload.inertia[:3])} kg m2, less than without it ({own}): write a case for "
+            f"{robot.name}, or fly case 2"
         )
 
 

@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 
 from space_robot.choice.candidates import Candidate, FlownCandidate, select
 from space_robot.choice.criteria import CRITERIA
-from space_robot.choice.front import Front, Tried
+from space_robot.choice.front import Front, Goal, Tried
 from space_robot.choice.law_search import has_estimate
 from space_robot.choice.search_space import FASTEST_HZ, SLOWEST_HZ, GainPoint, SearchSpace
 from space_robot.choice.stability import SmallMotions
@@ -93,15 +93,8 @@ def test_motions_grow_at_other_gains_than_those_tuned_and_viscous_friction_damps
 
 KP_KD = ("k_p", "k_d")
 SHARES = st.floats(1e-6, 10.0)
-SCORES = st.builds(
-    Score,
-    SHARES,
-    SHARES,
-    st.sampled_from([0.0, 0.5]),
-    st.sampled_from([1.0, 0.3]),
-    st.booleans(),
-    st.just({}),
-)
+ENDS = st.sampled_from([0.0, 0.5]), st.sampled_from([1.0, 0.3])
+SCORES = st.builds(Score, SHARES, SHARES, *ENDS, st.booleans(), st.just({}))
 
 
 @given(st.lists(SCORES, max_size=30), SHARES)
@@ -115,6 +108,14 @@ def test_nothing_tried_beats_the_front(scores: list[Score], ripple: float) -> No
     least = min((s.error for s in able if s.ripple <= ripple), default=np.inf)
     chosen = front.within(ripple)
     assert (chosen.score.error if chosen else np.inf) == least
+    assert chosen is None or front.nearest(Goal(ripple)).score.error == least
+
+
+def test_where_ripple_is_too_large_the_search_goes_on_from_gains_that_control() -> None:
+    scores = [Score(e, r, 0.0, 1.0, False, {}) for e, r in ((1, 0.06), (1e-3, 0.1), (1e-4, 2))]
+    front = Front("ctc", [Tried(np.zeros(1), score) for score in scores])
+    assert front.nearest(Goal(0.05)).score == scores[1]
+    assert front.nearest(Goal(0.05, 1e-5)).score == scores[2]
 
 
 def test_a_law_is_chosen_with_gains_that_fly_and_files_that_say_why(
@@ -128,11 +129,9 @@ def test_a_law_is_chosen_with_gains_that_fly_and_files_that_say_why(
     assert report["order"][0] == report["law"]
     assert set(report["order"]) | set(report["out"]) == {"ctc", "tde_stc"}
     own = resolve(Scenario(controller=report["law"], gains=f"a/{report['law']}/"))
-    np.testing.assert_allclose(
-        own.law.gain_values["k_d" if report["law"] == "ctc" else "k_1"],
-        report["candidates"][report["law"]]["gains"]["k_d" if report["law"] == "ctc" else "k_1"],
-        rtol=1e-9,
-    )
+    name = "k_d" if report["law"] == "ctc" else "k_1"
+    gains = report["candidates"][report["law"]]["gains"][name]
+    np.testing.assert_allclose(own.law.gain_values[name], gains, rtol=1e-9)
     for front in report["fronts"].values():
         assert [tried["ripple"] for tried in front] == sorted(t["ripple"] for t in front)
     assert report["sentence"] in Path("a/index.html").read_text("utf-8")
