@@ -20,7 +20,6 @@ from space_robot_msgs_py.config.validation import short
 from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.samples import RobotState
 
-from ..learning.reach import ACTION_WEIGHT, LARGEST, RATE_WEIGHT, WORST_COST
 from .scenario import FlyableScenario as Scenario
 
 try:
@@ -32,6 +31,13 @@ except ImportError:
 
 ScenarioDraw = Callable[[np.random.Generator], Scenario]
 
+WORST_COST = 100.0
+"""Cost per second that terminates an episode: that of a joint error of 10 rad."""
+RATE_WEIGHT, ACTION_WEIGHT = 0.1, 1e-3
+"""Weights of squared rates, rad2/s2, and squared actions in the cost per second; the weight of
+squared errors, rad2, is 1."""
+LARGEST = 1e4
+"""Limit of the absolute values of an observation; larger ones are clipped."""
 NAME = "space_robot/Tracking-v0"
 """Name for `gymnasium.make`, registered when this module is imported."""
 

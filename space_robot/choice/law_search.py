@@ -185,12 +185,9 @@ class LawSearch:
         from threadpoolctl import threadpool_limits  # comes with scikit-learn
 
         options = self.options
-        trials = Trials(
-            Scenario(**{**self.scenario_with(law), "duration": self.duration}),
-            options.uncertainty,
-            self.torques,
-            CRITERIA[options.criterion],
-        )
+        scenario = Scenario(**{**self.scenario_with(law), "duration": self.duration})
+        judged = options.uncertainty, self.torques, CRITERIA[options.criterion]
+        trials = Trials(scenario, *judged)
 
         def note(count: int) -> None:
             with Path(self.tally).open("ab") as file:

@@ -77,15 +77,8 @@ def report(choice: Recommendation) -> dict[str, Any]:
             for each in choice.flown
         },
         "compared": [
-            {
-                "law": c.law,
-                "other": c.other,
-                "finding": c.finding,
-                "ratio": c.ratio.value,
-                "p": c.p_better,
-                "better": c.better,
-                "worse": c.worse,
-            }
+            {"law": c.law, "other": c.other, "finding": c.finding, "ratio": c.ratio.value}
+            | {"p": c.p_better, "better": c.better, "worse": c.worse}
             for c in choice.compared
         ],
         "fronts": {
