@@ -153,8 +153,11 @@ def _reversing_wheels(metrics: Metrics) -> Iterator[str]:
         yield f"wheels that change their sense of rotation: {', '.join(often)} times a second"
 
 
-def limit_cycles(metrics: Metrics) -> Iterator[str]:
-    """Say which torques oscillate at one frequency, by more than a share of what they do."""
+def limit_cycles(metrics: Metrics, allowed: Metrics | None = None) -> Iterator[str]:
+    """Say which torques oscillate at one frequency, by more than a share of what they do.
+
+    ``allowed``: RMS of the torques, N m or N, that does not count.
+    """
     cycles = [
         f"{name} at {metrics[f'{name}.ripple_peak_hz']:.3g} Hz with {peak:.2g} "
         f"{column_definition(name).unit} RMS"
@@ -162,7 +165,7 @@ def limit_cycles(metrics: Metrics) -> Iterator[str]:
         if metrics[f"{name}.ripple_peak_hz"] <= FASTEST_CYCLE
         and metrics.get(f"{name}.ripple_lasting", 0.0) >= LASTING_CYCLE
         and peak >= PURE_CYCLE * metrics[f"{name}.ripple"]
-        and peak >= LARGE_CYCLE * metrics[f"{name}.rms"]
+        and peak >= max(LARGE_CYCLE * metrics[f"{name}.rms"], (allowed or {}).get(name, 0.0))
     ]
     if cycles:
         yield f"limit cycle: {', '.join(cycles)}"

@@ -44,6 +44,8 @@ class Candidate(NamedTuple):
     """Of its trials."""
     folder: str
     """Its gain files."""
+    allowed: Mapping[str, float] = {}
+    """Ripple allowed, by torque, N m or N: a limit cycle with less does not count."""
 
 
 @dataclass(frozen=True)
@@ -83,7 +85,9 @@ class FlownCandidate:
         count = len(self.flights)
         if ended := sum(not flight for flight in self.flights):
             return f"diverged in {ended} of {count} flights"
-        cycles = [text for flight in self.flights for text in limit_cycles(flight)]
+        cycles = [
+            text for flight in self.flights for text in limit_cycles(flight, self.candidate.allowed)
+        ]
         if len(cycles) > OFTEN * count:
             return f"{cycles[0]} (in {len(cycles)} of {count} flights)"
         beyond = sum(any(with_statistic(f, "beyond_effort").values()) for f in self.flights)

@@ -161,18 +161,14 @@ def recommend(
 
 def _candidates(search: LawSearch, name: str, front: Front, place: Path) -> list[Candidate]:
     """Return a law's gain sets of least error with the ripple allowed and with less."""
-    allowed = search.options.ripple
-    sets = {id(t): t for share in QUIETER if (t := front.within(share * allowed))}
+    ripple = search.options.ripple
+    sets = {id(t): t for share in QUIETER if (t := front.within(share * ripple))}
     controller, space = Law.parse(name).controller, search.space(name)
+    allowed = {torque: ripple * largest for torque, largest in search.torques.items()}
     return [
-        Candidate(
-            front.law,
-            controller,
-            space.at(tried.point),
-            tried.score,
-            f"{place}/{front.law}.{number}/",
-        )
-        for number, tried in enumerate(sets.values())
+        Candidate(front.law, controller, space.at(t.point), t.score, folder, allowed)
+        for number, t in enumerate(sets.values())
+        for folder in [f"{place}/{front.law}.{number}/"]
     ]
 
 
