@@ -70,7 +70,8 @@ class Planned:
 
         Its gains are a little larger than ``gains``, by law.
         """
-        options: dict[str, Any] = {"seed": 100 + lane, "case": "123"[lane % 3]}
+        cases = "122" if "robot" in self.options else "123"  # 3: the payload of the paper's robot
+        options: dict[str, Any] = {"seed": 100 + lane, "case": cases[lane % 3]}
         if gains:
             larger = {
                 n: {g: v * (1.01 + 0.01 * lane) for g, v in own.items()} for n, own in gains.items()
