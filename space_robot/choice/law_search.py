@@ -23,7 +23,7 @@ from ..campaign.gain_set import tuned_set, write_set
 from ..campaign.study import Law
 from ..console.progress import watching_progress
 from ..flight.flown_log import empty_log
-from ..flight.mission_demand import demand_complaint
+from ..flight.mission_demand import demand_remark
 from ..flight.plan import Flight, resolve
 from ..processes.executor import run_all
 from ..processes.scratch_folder import ScratchFolder
@@ -119,8 +119,8 @@ def prepare(
     friction = coefficients(known, nominal.plant_settings.friction)[: known.n]
     if (duration := nominal.ticks * nominal.period) < SHORTEST_S:
         raise InputError(f"a search needs {SHORTEST_S:g} s of flight or more, got {duration:g} s")
-    if complaint := demand_complaint(nominal.scenario, duration):
-        raise InputError(f"no law can fly this: {complaint}: use `space-robot plan` to stretch it")
+    if remark := demand_remark(nominal.scenario):
+        raise InputError(f"no law can fly this: {remark}")
     log = AnalysedLog(empty_log(nominal, 0, 1, is_brief=True))
     CRITERIA[options.criterion].check(log)
     peak = force_demand(known, nominal.scenario.mission, [nominal.scenario.plant]).peak

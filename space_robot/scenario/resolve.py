@@ -57,7 +57,8 @@ def resolve(scenario: Scenario) -> ResolvedScenario:
         assumed_actuators=software_actuators(scenario, settings),
         process_faults=faults,
     )
-    _check_payload(resolved)
+    if resolved.plant.payload.mass:
+        _check_payload(resolved)
     _check_disturbance(resolved)
     _check_actuators(resolved)
     return _with_sampled_disturbance(resolved) if callable(scenario.disturbance) else resolved
@@ -149,7 +150,7 @@ def _check_payload(scenario: ResolvedScenario) -> None:
     payload, robot, case = scenario.plant.payload, scenario.robots.controller, scenario.options.case
     mass, inertia = robot.mass[robot.tool.body], robot.inertia[robot.tool.body]
     gained = np.linalg.eigvalsh(inertia_tensor(payload.inertia) - inertia)
-    if payload.mass and (payload.mass < mass or gained[0] < -1e-9):
+    if payload.mass < mass or gained[0] < -1e-9:
         own = f"{mass:g} kg, {short(np.diag(inertia).tolist())} kg m2"
         raise InputError(
             f"case {case}: with its payload the last link has {payload.mass:g} kg and "
