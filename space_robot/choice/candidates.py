@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from itertools import chain
 from typing import NamedTuple
 
 import numpy as np
@@ -14,14 +15,14 @@ from space_robot_model.elementary.matrices import Array
 
 from ..analysis.words import Metrics, limit_cycles, with_statistic
 from ..campaign.row.fly import RowFlyer
-from ..campaign.row.row import Task
+from ..campaign.row.row import Task, Value
 from ..campaign.study import Study
 from ..campaign.verdicts.laws import PairedComparison, compare, holm
 from ..flight.batch import fly_in_lanes
 from ..processes.executor import run_all
 from .criteria import CRITERIA, Criterion, is_error
 from .search_space import GainPoint
-from .trials import HELD, Score
+from .trials import HELD, LATENCY, Score
 
 OFTEN = 0.1
 """A law is out if a larger share of its flights has a limit cycle, or a joint beyond its effort."""
@@ -125,21 +126,23 @@ def fly_candidates(
     """
     laws = [f"{c.controller}={c.folder}" for c in candidates]
     flyer = RowFlyer.of(study.model_copy(update={"laws": laws}), seed, runs)
-    groups = [tuple(range(k, min(k + GROUP, runs))) for k in range(0, runs, GROUP)]
+    runs_of: dict[Value, list[int]] = {}  # only flights of one latency share lanes
+    for run in range(runs):
+        runs_of.setdefault(flyer.draws.values(run).get(LATENCY, 0), []).append(run)
+    groups = [same[k : k + GROUP] for same in runs_of.values() for k in range(0, len(same), GROUP)]
     tasks = [tuple(Task(run, law) for run in group) for group in groups for law in laws]
     flown = run_all(partial(_fly, flyer, criterion), tasks, workers, progress)
-    by_law: dict[str, list[dict[str, float]]] = {law: [] for law in laws}
-    for task, flights in zip(tasks, flown, strict=True):
-        by_law[task[0].law] += flights
-    return [FlownCandidate(c, by_law[law]) for c, law in zip(candidates, laws, strict=True)]
+    by_task = dict(zip(chain(*tasks), chain(*flown), strict=True))
+    return [
+        FlownCandidate(candidate, [by_task[Task(run, law)] for run in range(runs)])
+        for candidate, law in zip(candidates, laws, strict=True)
+    ]
 
 
 def ranked(flown: Sequence[FlownCandidate], criterion: Criterion) -> list[FlownCandidate]:
     """Return the candidates that are not out, the best one first."""
     able = [each for each in flown if not each.reason]
-    if not able:
-        return []
-    least = min(each.median(criterion.error) for each in able)
+    least = min((each.median(criterion.error) for each in able), default=math.inf)
     near = [each for each in able if each.median(criterion.error) <= criterion.near * least]
     return sorted(near, key=lambda each: each.median(criterion.value))
 

@@ -42,8 +42,6 @@ CHOICE = "choice"
 """Folder of a longer choice by `space-robot choose`."""
 SHORT = ChoiceOptions(evaluations=48, trial_s=6.0, runs=8, is_short=True)
 """How the law is chosen: shorter than `space-robot choose` does."""
-
-
 LEG_S = 10.0
 """The shortest duration of a leg, s."""
 LONGEST_LEG_S = 600.0
@@ -289,8 +287,7 @@ def hinge_remark(robot: Robot, command: str, folder: Path) -> str:
         command: the user's command.
         folder: that it made.
     """
-    names = hinges(robot)
-    if not names:
+    if not (names := hinges(robot)):
         return ""
     texts = [f"{name}:{own['stiffness']:g},{own['damping']:g}" for name, own in names.items()]
     options = [word for text in texts for word in ("--passive", text)]

@@ -26,6 +26,7 @@ from .criteria import Criterion, mean_log
 from .search_space import GainPoint
 from .stability import SmallMotions
 
+LATENCY = "plant.command_latency_ticks"
 ALLOWED_SATURATION = 0.01
 """Largest share of ticks with a wheel at its limit."""
 HELD = 0.5
@@ -87,8 +88,7 @@ class Uncertainty:
         if self.torque_scale:
             vary["faults"] = {"torque_scale@0:all": within(self.torque_scale)}
         if self.latency_ticks:
-            later = {"choice": list(range(self.latency_ticks + 1)), "offset": True}
-            vary["plant.command_latency_ticks"] = later
+            vary[LATENCY] = {"choice": list(range(self.latency_ticks + 1)), "offset": True}
         return vary
 
 
@@ -196,7 +196,7 @@ class Trials:
                 value = value_at(tree, path)
                 if not isinstance(value, Unavailable):
                     changed[path] = deviation.friction * value
-        latency = ("plant", "command_latency_ticks")
+        latency = tuple(LATENCY.split("."))
         changed[latency] = value_at(tree, latency) + deviation.latency_ticks
         changed["faults", "torque_scale@0:all={}"] = deviation.torque_scale
         return self.nominal.variation(changed, self.nominal.scenario.seed)
