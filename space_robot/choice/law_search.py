@@ -109,11 +109,10 @@ def prepare(
     for_tuning = {key: scenario[key] for key in TUNED if key in scenario}
     tuned = _tuned(for_tuning, str(scenario.get("case", WITHOUT_PAYLOAD)))
     write_set(tuned, command, folder / TUNED_SET)
-    gains = f"{folder}/{TUNED_SET}"
     for law, controller in zip(names, controllers, strict=True):
         if "=" not in law and controller not in tuned.laws:
             raise InputError(f"law {law}: has no tuned gains: give some, {law}=GAINS")
-    search = LawSearch(names, dict(scenario), gains, {}, options)
+    search = LawSearch(names, dict(scenario), f"{folder}/{TUNED_SET}", {}, options)
     nominal = Scenario(**search.scenario_with(names[0])).check()
     known = nominal.scenario.robots.controller
     friction = coefficients(known, nominal.plant_settings.friction)[: known.n]
@@ -136,13 +135,16 @@ def prepare(
 
 
 def _tuned(options: Mapping[str, Any], case: str) -> Tuned:
-    """Tune for a case; where its payload leaves no margin at all, for the robot without one."""
+    """Tune for a case; where payload, or then noise, leaves no gains at all, without it."""
     try:
         return tuned_set(options, [case], INITIAL_TUNING, lambda text: None)
     except InputError:
-        if case == WITHOUT_PAYLOAD:
+        if case != WITHOUT_PAYLOAD:
+            return _tuned(options, WITHOUT_PAYLOAD)
+        if "sensors" not in options:
             raise
-        return tuned_set(options, [WITHOUT_PAYLOAD], INITIAL_TUNING, lambda text: None)
+        noisy = ("sensors", "navigation")
+        return _tuned({key: own for key, own in options.items() if key not in noisy}, case)
 
 
 def has_estimate(law: str) -> bool:
@@ -186,8 +188,7 @@ class LawSearch:
 
         options = self.options
         scenario = Scenario(**{**self.scenario_with(law), "duration": self.duration})
-        judged = options.uncertainty, self.torques, CRITERIA[options.criterion]
-        trials = Trials(scenario, *judged)
+        trials = Trials(scenario, options.uncertainty, self.torques, CRITERIA[options.criterion])
 
         def note(count: int) -> None:
             with Path(self.tally).open("ab") as file:

@@ -78,8 +78,7 @@ def rest_to_rest(robot: Robot) -> MissionSettings:
     longest = np.abs(np.diff(points, axis=0)).max(axis=0)
     leg = max(LEG_S, float(np.max(PEAK_VELOCITY * longest / (LIMIT_SHARE * velocity))))
     asked = force_demand(nominal, _mission(robot, points, leg), [EnvironmentSettings()]).nominal
-    leg *= max(1.0, math.sqrt(float(np.max(asked[3:] / (LIMIT_SHARE * effort)))))
-    leg = math.ceil(leg)
+    leg = math.ceil(leg * max(1.0, math.sqrt(float(np.max(asked[3:] / (LIMIT_SHARE * effort))))))
     if leg > LONGEST_LEG_S:
         raise InputError(
             f"robot {robot.name!r}: with its limits of velocity and effort the legs of a mission "
