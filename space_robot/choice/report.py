@@ -91,8 +91,7 @@ def report(choice: Recommendation) -> dict[str, Any]:
 
 def campaign_text(choice: Recommendation, folder: Path, command: str) -> str:
     """Return a campaign of the best laws, which continues the comparison."""
-    best = choice.order[:CAMPAIGN_LAWS]
-    laws = [f"{each.candidate.controller}={folder / each.law}/" for each in best]
+    laws = [f"{c.candidate.controller}={folder / c.law}/" for c in choice.order[:CAMPAIGN_LAWS]]
     scenario = dict(choice.scenario)
     study = {"scenario": scenario, "laws": laws, "vary": choice.vary, "runs": CAMPAIGN_RUNS}
     head = f"# Made by `{command}`: the best laws, each with its gains, over more draws.\n"
@@ -104,8 +103,7 @@ def fronts_figure(fronts: Mapping[str, Front], chosen: str = "") -> Figure:
     figure = page(95.0)
     axes = figure.add_subplot()
     draw_fronts(axes, {law: [t.score[:2] for t in f.best] for law, f in fronts.items()}, chosen)
-    axes.set_xlabel("ripple of the torques, % of the largest in the mission")
-    axes.set_ylabel("error")
+    axes.set(xlabel="ripple of the torques, % of the largest in the mission", ylabel="error")
     if any(front.best for front in fronts.values()):
         axes.legend(loc="center left", bbox_to_anchor=(1.01, 0.5), frameon=False)
     return figure
@@ -129,8 +127,7 @@ def draw_fronts(
             marker=".",
             label=law,
         )
-    axes.set_xscale("log")
-    axes.set_yscale("log")
+    axes.set(xscale="log", yscale="log")
     axes.grid(True, which="major", alpha=0.3)
 
 

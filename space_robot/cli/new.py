@@ -226,8 +226,7 @@ def new_robot(
     check_replaceable(folder, force, texts)
     compile_lanes()
     workers = cores() if workers is None else workers
-    own = laws or SHORT.laws
-    options = replace(SHORT, laws=own, evaluations=evaluations, runs=runs, workers=workers)
+    options = replace(SHORT, laws=laws, evaluations=evaluations, runs=runs, workers=workers)
     made = make_robot(texts, read, folder, command, options)
     said = f"made {folder}/"
     if made.choice.law:
