@@ -130,7 +130,7 @@ def watching_progress(what: str, total: int, count: Callable[[], int]) -> Iterat
         finally:
             is_over.set()
             watcher.join()
-        show(count(), total)
+        show(total, total)
 
 
 class _Rate(ProgressColumn):
