@@ -63,17 +63,17 @@ def new(*arguments: str) -> Result:
     return run("new", *arguments)
 
 
-def quickly(monkeypatch: pytest.MonkeyPatch, *of_laws: str) -> None:
-    """Let `new` choose among some laws, with the gains from which a search would start."""
-    short = ChoiceOptions(laws=of_laws, evaluations=1, trial_s=1.0, runs=2, ripple=10.0)
+def quickly(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let `new` choose by short trials, with the gains from which a search would start."""
+    short = ChoiceOptions(evaluations=1, trial_s=1.0, runs=2, ripple=10.0)
     monkeypatch.setattr("space_robot.choice.new_robot.SHORT", short)
 
 
 def test_choose_sets_the_law_of_ones_own_robot_and_of_no_shipped_one(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    quickly(monkeypatch, "ctc")
-    made = new(str(ARM), "--out", "mine", *FEW)
+    quickly(monkeypatch)
+    made = new(str(ARM), "--out", "mine", "--law", "ctc", *FEW)
     assert made.exit_code == 0, made.exception
     words = ("--law", "pd", *FEW, "--duration", "1.1", "--ripple", "10")
     own = run("choose", "mine/robot.yaml", *words)
@@ -88,8 +88,8 @@ def test_choose_sets_the_law_of_ones_own_robot_and_of_no_shipped_one(
 def test_a_file_becomes_a_folder_that_flies(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    quickly(monkeypatch, "ctc", "pd")
-    result = new(FILE, "--out", "mine", *FEW, "--json")
+    quickly(monkeypatch)
+    result = new(FILE, "--out", "mine", "--law", "ctc", "--law", "pd", *FEW, "--json")
     assert result.exit_code == 0, result.exception
     assert "made mine/: `space-robot fly --robot mine/` flies it" in result.stderr
     report = json.loads(result.stdout)
