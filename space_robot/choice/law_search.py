@@ -211,8 +211,8 @@ class LawSearch:
                 # a law with a large memory takes longest, so it begins first
                 order = sorted(kinds, key=lambda law: -kinds[law].memory_type.block(1).nbytes)
                 how = order, min(self.options.workers, len(order))
-                found = run_all(replace(self, tally=tally), *how)
-                return [found[order.index(law)] for law in self.laws]
+                fronts = run_all(replace(self, tally=tally), *how)
+                return [fronts[order.index(law)] for law in self.laws]
 
     def scenario_with(self, law: str) -> dict[str, Any]:
         """Return the options of the scenario with a law."""
