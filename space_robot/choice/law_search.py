@@ -203,15 +203,15 @@ class LawSearch:
     def fronts(self) -> list[Front]:
         """Return the front of each law; a progress line counts their gain sets."""
         with ScratchFolder() as folder:
-            tally = f"{folder}/tried"
-            Path(tally).touch()
+            tally = Path(folder) / "tried"
+            tally.touch()
             kinds = {law: find_law(Law.parse(law).controller) for law in self.laws}
             total = self.options.evaluations * len(kinds)
-            with watching_progress("gain sets tried", total, lambda: os.stat(tally).st_size):
+            with watching_progress("gain sets tried", total, lambda: tally.stat().st_size):
                 # a law with a large memory takes longest, so it begins first
                 order = sorted(kinds, key=lambda law: -kinds[law].memory_type.block(1).nbytes)
                 how = order, min(self.options.workers, len(order))
-                fronts = run_all(replace(self, tally=tally), *how)
+                fronts = run_all(replace(self, tally=str(tally)), *how)
                 return [fronts[order.index(law)] for law in self.laws]
 
     def scenario_with(self, law: str) -> dict[str, Any]:
